@@ -23,6 +23,7 @@ from shipid.answer.verdict import (
 from shipid.evidence import SIGNIFICANT, Differences, log_error, paired_difference
 from shipid.metrics import error_of_windows
 from shipid.report.wording import REGRESSION, counted_text, join_few_names, metres_text
+from shipid.study.cells import EQUAL_WEIGHTS
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, learning_methods, orders_may_react, verdict_method
 from shipid.study.results import Results
@@ -337,8 +338,10 @@ def _means_over_foundations(case: AnswerCase) -> Iterator[str]:
     for name in (block.name for block in case.results.plan.study.model if {block.name, case.best} <= set(table.H)):
         sides = case.sides([name], table.lead(str(case.best), [name], case.ends[largest]))
         verdict = ("lower than", "higher than", "not shown to differ from")[[bool(side) for side in sides].index(True)]
-        text = f"The mean {name} of foundations has H {case.error(name, largest)} with {counted_text(largest, 'run')}"
-        yield f"{text}: {verdict} that of {case.best}."
+        text = f"With {counted_text(largest, 'run')} {name}, a mean of foundations, has H {case.error(name, largest)}"
+        notes = case.results.judged_cells.set_index("foundation")["sentence"][[name]]
+        equal = f"; {EQUAL_WEIGHTS}" if notes.str.contains(EQUAL_WEIGHTS, regex=False).any() else ""
+        yield f"{text}: {verdict} that of {case.best}{equal}."
 
 
 def _reservations(case: AnswerCase) -> Iterator[str]:
@@ -356,17 +359,26 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         yield from _sentences_on_sides(
             sides, f"{are} worse than {smallest} for", f"{are} not clearly better than {smallest} for"
         )
-    constant = f"constant u, v, r (H {metres_text(float(case.results.naive.mean()))})"
     if models:
-        naive = log_error(case.results.by_run(error_of_windows(case.results.naive)))
-        ahead = naive - np.stack([log_error(table.draws(name, last)).mean(axis=0) for name in models])
-        noise = table.noise([[(1.0, name, last)] for name in models])
-        sides = case.sides(models, paired_difference(ahead, *noise))
-        yield from _sentences_on_sides(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
-        if len(sides[0]) == len(models):
-            yield f"With {counted_text(largest, 'run')}, every compared model beats {constant}."
+        yield from _no_better_than_constant(case, models)
     if models and REGRESSION in table.H:
         yield from _no_better_than_regression(case, models)
+
+
+def _no_better_than_constant(case: AnswerCase, models: Sequence[str]) -> Iterator[str]:
+    """Which models do not beat constant u, v, r, with the fewest and with the most runs."""
+    constant, beaten = f"constant u, v, r (H {metres_text(float(case.results.naive.mean()))})", []
+    naive = log_error(case.results.by_run(error_of_windows(case.results.naive)))
+    for amount, place in case.ends.items():
+        ahead = naive - np.stack([log_error(case.table.draws(name, place)).mean(axis=0) for name in models])
+        noise = case.table.noise([[(1.0, name, place)] for name in models])
+        sides, runs = case.sides(models, paired_difference(ahead, *noise)), counted_text(amount, "run")
+        unknown = f"With {runs} it is not shown that {constant} are beaten by"
+        yield from _sentences_on_sides(sides, f"With {runs} {constant} beat", unknown)
+        beaten += [str(amount)] if len(sides[0]) == len(models) else []
+    if beaten:
+        run = plural_word(int(beaten[-1]), "run")
+        yield f"With {' and '.join(beaten)} {run}, every compared model beats {constant}."
 
 
 def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Iterator[str]:

@@ -238,6 +238,7 @@ def study_score(
             mine = table[table["method"].eq(label)].iloc[0]
             end, end_90, H = (f"{mine[name]:.4g} m" for name in ("H_end", "H_end_90", "H"))
             words = f"{label}: at the horizon {end}, nine in ten below {end_90}, H {H}"
+            words += f"; beside N_D {' and '.join(map(str, sorted({*table['N_D'][table['method'].eq(label)]})))}"
             answer.say(f"{words}\nothers, and by how many % their H is above this one, with its 95 % interval:")
             answer.records(label, table, heads | {"better": "better runs"}, shown=table[table["method"].ne(label)])
     with show_steps() as say:

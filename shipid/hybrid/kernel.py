@@ -28,7 +28,7 @@ class Kernel(SearchedAlone):
     Parameters
     ----------
     trials : descents, each without its own part of the runs; their solutions are averaged. With fewer
-        than three runs for each trial, one more on all runs is the solution.
+        than three runs for each trial, one more is on all runs.
     steps : of a descent, at most.
     scale : range of the length scales, in standard deviations of the inputs.
     linear : range of the weight of the linear kernel. ridge : range of the variance of noise, that of the kernel is 1.

@@ -32,10 +32,15 @@ def kernel_group(name: str) -> str:
 
 
 def kernel_values(points: Any, centres: Any, linear: Any, maths: Any = np) -> Any:
-    """exp(-|z - c|^2 / 2) + l (1 + z c), (S, C), of points (S, d) and centres (C, d) divided by their scales."""
+    """exp(-|z - c|^2 / 2) + l (1 + z c) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales."""
     product = points @ centres.T
-    apart = (points**2).sum(-1)[:, None] + (centres**2).sum(-1) - 2 * product
-    return maths.exp(-apart / 2) + linear * (1 + product)
+    values = product - (points**2).sum(-1)[..., None] / 2
+    values -= (centres**2).sum(-1) / 2
+    maths.exp(values, out=values)
+    product += 1
+    product *= linear
+    values += product
+    return values
 
 
 @dataclass(frozen=True)

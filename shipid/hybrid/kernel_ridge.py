@@ -14,6 +14,7 @@ import torch
 from scipy.optimize import minimize
 from torch import Tensor
 
+from shipid.hybrid.compensator import unflatten_paths
 from shipid.hybrid.kernel_compensator import GROUPS, KernelCompensator, KernelMember, kernel_group, kernel_values
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.ridge import part_of_runs
@@ -21,14 +22,15 @@ from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_fold
 from shipid.hybrid.units import VaryingInputs
 
 PRIOR = 0.1  # weight of the squared distance from the start of a descent, in logarithms, where one run is seen
-FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, what they choose is for errors left out alone
+FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, one more descent leaves none out
 
 
 class KernelProblem(PathProblem):
     """One foundation. Each trial leaves every `parts`-th fold out of its choice of scales.
 
     The errors of the runs of these folds are those of this trial alone, so that no run has a part in what predicts it.
-    With few folds the solution is by a descent on all of them. With one part there are no errors left out.
+    With few folds one more descent is on all of them: a third of three runs would choose by two. With one part there
+    are no errors left out.
     """
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
@@ -36,8 +38,13 @@ class KernelProblem(PathProblem):
         self.windows = windows_of_folds(task)
         self.varying = VaryingInputs.of(self.rows(self.windows), method.mirror)
         self.scales = [f"{kernel_group(name)}_scale" for name in self.varying.normaliser.names]
-        self.values = self._tensor(self.varying.normaliser.apply(self.table))
-        self.outputs = self._tensor(self.weights.T)  # (2, S, r)
+        values, reflection = self.varying.normaliser.apply(self.table), self.varying.reflection
+        self.values, self.outputs = self._tensor(values), self._tensor(self.weights.T)  # (S, d), (2, S, r)
+        self.sides = self._tensor(
+            np.stack([values] if reflection is None else [values, values @ reflection])
+        )  # (K, S, d)
+        if reflection is None:
+            self.outputs = torch.cat([*self.outputs], dim=1)[None]
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
         self.parts = min(method.trials, len(task.folds))
         self.few = self.parts > 1 and len(task.folds) < FOLDS_OF_PART * method.trials
@@ -45,16 +52,12 @@ class KernelProblem(PathProblem):
     def _tensor(self, values: Any) -> Tensor:
         return torch.as_tensor(values, dtype=torch.float64, device=self.task.device)
 
-    def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> list[Tensor]:
-        """Kernels (S, C) that make x and y, between windows, with the settings of a trial."""
-        scales, seen = torch.stack([self._tensor(settings[name]) for name in self.scales]), self.values[points]
+    def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> Tensor:
+        """Kernels (K, S, C) between windows, with the settings of a trial: those of x and of y, or one of both."""
+        scales = torch.stack([self._tensor(settings[name]) for name in self.scales])
         around = self.values[centres] / scales
-        plain = kernel_values(seen / scales, around, settings["linear"], torch)
-        if self.varying.reflection is None:
-            return [plain, plain]
-        mirrored = seen @ self._tensor(self.varying.reflection) / scales
-        image = kernel_values(mirrored, around, settings["linear"], torch)
-        return [plain + image, plain - image]
+        sides = self.sides[:, points] / scales
+        return mirror_sums(kernel_values(sides, around, settings["linear"], torch))
 
     def folds_left_out(self, number: int) -> list[tuple[Index, Index]]:
         """Folds that a trial leaves out of its choice of scales."""
@@ -66,9 +69,8 @@ class KernelProblem(PathProblem):
 
     def descend(self, point: Point, hidden: Sequence[tuple[Index, Index]] = ()) -> TrialWorth:
         """Descend from a point by the other folds; return the mean error [m^2] there, the settings, and the steps."""
-        seen, out = self.windows, {id(fold) for fold in hidden}
-        for training, _ in hidden:
-            seen = np.intersect1d(seen, training)
+        out, others = {id(fold) for fold in hidden}, np.concatenate([self.windows[:0], *(fold[0] for fold in hidden)])
+        seen = self.windows[np.bincount(others, minlength=self.windows[-1] + 1)[self.windows] == len(hidden)]
         folds = [fold for fold in self.task.folds if id(fold) not in out]
         rows = seen[part_of_runs(self.task.windows.run[seen], self.method.search_windows)]
         idle = {f"{group}_scale" for group in GROUPS} - {*self.scales}
@@ -76,18 +78,28 @@ class KernelProblem(PathProblem):
         blocks, names = FoldBlocks(folds, rows, self.task.device), list(ranges)
         prior = PRIOR / len(np.unique(self.task.windows.run[rows]))
         start, ends = (np.log([table[name] for name in names]) for table in (point, ranges))
+        groups, outputs = list(dict.fromkeys(self.scales)), self.outputs[:, rows]
+        products, squares = self.group_products(rows, groups)
+        shape = (len(self.sides), len(rows), len(rows))
 
         def value_and_slope(logs: Array) -> tuple[float, Array]:
-            x, value = self._tensor(logs).requires_grad_(), 0.0
-            settings = {**point, **dict(zip(names, x.exp(), strict=True))}
-            for kernel, outputs in zip(self.kernels(rows, rows, settings), self.outputs[:, rows], strict=True):
-                whole = kernel + settings["ridge"] * torch.eye(len(rows)).to(kernel)
-                missed, slope = blocks.errors_and_slope(whole.detach(), outputs)
-                value += float((missed**2).sum())
-                whole.backward(slope, retain_graph=True)
-            assert x.grad is not None
-            away = logs - start
-            return np.log(value) + prior * away @ away, x.grad.cpu().numpy() / value + 2 * prior * away
+            settings = {**point, **dict(zip(names, np.exp(logs), strict=True))}
+            weights = self._tensor([settings[group] ** -2 for group in groups])
+            product, half = (weights @ products).view(shape), weights @ squares / 2
+            bell = torch.exp(product - half[:, None] - half)
+            whole = mirror_sums(bell + settings["linear"] * (1 + product))
+            whole.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
+            missed, slope = blocks.errors_and_slope(whole, outputs)
+            by_ridge, plain = slope.diagonal(dim1=1, dim2=2).sum(), mirror_sums(slope)
+            product, bell, linear = plain * (1 + product), plain * bell, settings["linear"]
+            by_weight = (
+                products @ (bell + linear * plain).flatten() - squares @ (bell.sum((0, 1)) + bell.sum((0, 2))) / 2
+            )
+            slopes = dict(zip(groups, -2 * weights * by_weight, strict=True))
+            slopes |= {"linear": linear * product.sum(), "ridge": settings["ridge"] * by_ridge}
+            value, away = float((missed**2).sum()), logs - start
+            slope_of_logs = np.array([float(slopes[name]) for name in names])
+            return np.log(value) + prior * away @ away, slope_of_logs / value + 2 * prior * away
 
         options = {"maxfun": self.method.steps}
         best = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", bounds=ends, options=options)
@@ -96,17 +108,18 @@ class KernelProblem(PathProblem):
         chosen = {**point, **dict(zip(names, map(float, values), strict=True))}
         return float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)
 
-    def solve(self, settings: Mapping[str, Any]) -> list[tuple[Tensor, Tensor]]:
-        """G (C, C) and weights (C, r) of x and of y."""
-        solved = []
-        for kernel, outputs in zip(
-            self.kernels(self.part, self.part, settings), self.outputs[:, self.part], strict=True
-        ):
-            inverse = torch.cholesky_inverse(
-                torch.linalg.cholesky(kernel + settings["ridge"] * torch.eye(len(kernel)).to(kernel))
-            )
-            solved.append((inverse, inverse @ outputs))
-        return solved
+    def group_products(self, rows: Index, groups: Sequence[str]) -> tuple[Tensor, Tensor]:
+        """Products of windows, as they are and mirrored, (G, K S S), and their squares (G, S), by group of inputs."""
+        own = self._tensor(np.array(groups)[:, None] == self.scales)[:, None]  # (G, 1, d)
+        values = self.values[rows] * own
+        return (self.sides[:, rows] @ values.mT[:, None]).flatten(1), (values**2).sum(dim=2)
+
+    def solve(self, settings: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
+        """G (K, C, C) and weights (K, C, R)."""
+        kernel = self.kernels(self.part, self.part, settings)
+        kernel.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
+        inverse = torch.cholesky_inverse(torch.linalg.cholesky(kernel))
+        return inverse, inverse @ self.outputs[:, self.part]
 
     def corrector(self, best: Sequence[Row]) -> KernelCompensator:
         """Return the mean of the solutions, and keep what those of the trials miss without each fold."""
@@ -114,32 +127,43 @@ class KernelProblem(PathProblem):
         tried = [(row["params"], self.folds_left_out(row["number"])) for row in best if row["number"] < self.parts]
         if self.few:
             tried.append((self.descend(next(iter(self.method.points())))[1], []))
-        errors, first = np.full_like(self.targets, np.nan), -1 if self.few else 0
+        errors = np.full_like(self.targets, np.nan)
         for settings, folds in tried:
             solved, scales = self.solve(settings), np.array([settings[name] for name in self.scales])
-            weights = torch.cat([weights for _, weights in solved], dim=1).cpu().numpy()
+            weights = torch.cat([*solved[1]], dim=1).cpu().numpy()
             members.append(KernelMember(scales, settings["linear"], weights))
             self._leave_out(folds, settings, solved, errors)
-        self.left_out, members = errors if self.parts > 1 else None, members[first:]
+        self.left_out = errors if self.parts > 1 else None
         return KernelCompensator(
-            self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[first][0]
+            self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[0][0]
         )
 
     def _leave_out(
         self,
         folds: Sequence[tuple[Index, Index]],
         settings: Mapping[str, Any],
-        solved: list[tuple[Tensor, Tensor]],
+        solved: tuple[Tensor, Tensor],
         errors: Array,
     ) -> None:
         """Write errors (T, S, 2) [m] on the judged windows of folds, by solutions without each fold."""
         for training, judged in folds:
             out = np.flatnonzero(~np.isin(self.part, training))
-            paths = []
-            for kernel, (inverse, weights) in zip(self.kernels(judged, self.part, settings), solved, strict=True):
-                missed = torch.linalg.solve(inverse[out][:, out], weights[out])
-                paths.append((kernel @ (weights - inverse[:, out] @ missed)).cpu().numpy())
-            errors[:, judged] = self.targets[:, judged] - np.tensordot(self.basis, np.stack(paths, axis=-1), (1, 1))
+            inverse, weights = solved
+            missed = torch.linalg.solve(inverse[:, out][:, :, out], weights[:, out])
+            paths = self.kernels(judged, self.part, settings) @ (weights - inverse[:, :, out] @ missed)
+            outputs = unflatten_paths(torch.cat([*paths], dim=1).cpu().numpy())
+            errors[:, judged] = self.targets[:, judged] - np.tensordot(self.basis, outputs, 1)
+
+
+def mirror_sums(sides: Tensor) -> Tensor:
+    """Sum and difference (2, S, C) of kernels with windows as they are and with mirrored ones, in their place.
+
+    These make x and y. Without a mirror there is one (1, S, C), which stays.
+    """
+    if len(sides) == 2:
+        sides[0] += sides[1]
+        torch.sub(sides[0], sides[1], alpha=2, out=sides[1])
+    return sides
 
 
 class FoldBlocks:
@@ -158,17 +182,17 @@ class FoldBlocks:
         self.out, self.known, self.judged = (torch.as_tensor(each, device=device) for each in (filled, known, judged))
 
     def errors_and_slope(self, kernel: Tensor, outputs: Tensor) -> tuple[Tensor, Tensor]:
-        """What a fit without each block misses of it (F, b, r), 0 where it is not judged; slope (S, S) of its square.
+        """What fits without each block miss of it (K, F, b, R), 0 where it is not judged; slope of its square.
 
-        kernel : (S, S) with the ridge. outputs : (S, r).
+        kernel : (K, S, S) with the ridge. outputs : (K, S, R).
         """
         inverse = torch.cholesky_inverse(torch.linalg.cholesky(kernel))
-        weights, columns = inverse @ outputs, inverse[self.out]  # (F, b, S)
+        weights, columns = inverse @ outputs, inverse[:, self.out]  # (K, F, b, S)
         both = self.known[:, :, None] & self.known[:, None, :]
         eye = torch.eye(both.shape[1], dtype=kernel.dtype, device=kernel.device)
-        blocks = torch.where(both, columns.take_along_dim(self.out[:, None, :], dim=2), eye)
+        blocks = torch.where(both, columns.take_along_dim(self.out[None, :, None], dim=3), eye)
         factors = torch.linalg.cholesky(blocks)
-        every = torch.cholesky_solve(self.known[..., None] * weights[self.out], factors)
+        every = torch.cholesky_solve(self.known[..., None] * weights[:, self.out], factors)
         missed = self.judged[..., None] * every
-        left, right = ((columns.mT @ one).transpose(0, 1) for one in (torch.cholesky_solve(missed, factors), every))
-        return missed, 2 * (left.flatten(1) @ right.flatten(1).T - left.sum(dim=1) @ weights.T)
+        left, right = ((columns.mT @ one).transpose(1, 2) for one in (torch.cholesky_solve(missed, factors), every))
+        return missed, 2 * (left.flatten(2) @ right.flatten(2).mT - left.sum(dim=2) @ weights.mT)

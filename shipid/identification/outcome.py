@@ -289,6 +289,7 @@ def run_identification(
         if (solution.at_bound | solution.held).all():
             raise ShipidError(_no_estimate_reason(solution))
         _go_on(held)
+        settings = settings.model_copy(update={"step": solution.settings.step})
         judged = fit_statistics(LinearFit.of(solution))
         determined = [path for path in profiles if path in judged.free]
         curves = tuple(_profile(path, dataset, solution, judged) for path in determined)

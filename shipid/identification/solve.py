@@ -23,6 +23,7 @@ from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents
 from shipid.vessel.load import Vessel
 
+HALVINGS = 3  # of the default step, at most, as `study new` does
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
 UNEVEN = 0.01  # of the time between rows: a difference above it counts
 FAR = 0.05  # of the time in which a ship goes her length: between rows so far apart, lines miss how she turns
@@ -42,7 +43,8 @@ def identify(
     """Estimate the factors that minimise the weighted prediction errors of the runs.
 
     With `discount` the fit is repeated with the deviations of the signals times their level and the square root of the
-    correlation time of their residuals, in samples; the settings of the solution have these.
+    correlation time of their residuals, in samples; the settings of the solution have these. Where predictions diverge
+    at the default step, as those of a small craft do, it is halved; the settings of the solution have that, too.
 
     runs : names, or one. settings : unknowns, weights, horizon and solver.
     start : path -> initial factor, or an earlier solution; default: the setting `start`.
@@ -58,6 +60,12 @@ def identify(
     runs = as_names("runs", () if runs is None else runs, DataError)
     plain = settings.model_copy(update={"discount": False})
     solution = _fit_choosing_current(vessel, dataset, runs, plain, start, progress)
+    for _ in range(0 if "step" in settings.model_fields_set else HALVINGS):
+        if solution.status == "diverged":
+            plain = plain.model_copy(update={"step": plain.step / 2})
+            solution = _fit_choosing_current(vessel, dataset, runs, plain, start, progress)
+            words = f"predictions diverge in steps of {settings.step:g} s, the default: steps are {plain.step:g} s"
+            solution = replace(solution, warnings=(words, *solution.warnings))
     if not settings.discount:
         return solution
     for _ in range(DISCOUNTS):

@@ -194,13 +194,10 @@ def cells_table(content: ReportContent) -> PageTable:
 
 
 def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with a `status` that says why there is no result, where it is not "ok"."""
+    """The frame with a `status` that says why there is no result, or what to know of it."""
     why = frame.get("sentence", pd.Series("", index=frame.index)).fillna("")
     pairs = zip(frame.status, why, strict=True)
-    cells = [
-        word_cell(f"{status}: {words}" if words and status != "ok" else status, bad=status != "ok")
-        for status, words in pairs
-    ]
+    cells = [word_cell(f"{status}: {words}" if words else status, bad=status != "ok") for status, words in pairs]
     return with_cells(frame, status=cells)
 
 

@@ -94,7 +94,10 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     if whole.empty:
         return f"with N_D = {N_D} no method has a result in every cell with physics"
     best, alike = whole.iloc[0], whole.H.iloc[0] * (1 + ALIKE_ERRORS) >= whole.H
-    tied, over = [str(name) for name in whole.method[alike]], " over all cells with physics" if first else ""
+    tied, over = (
+        [str(name) for name in whole.method[alike]],
+        " in the mean over all foundations with physics" if first else "",
+    )
     err = plural_word(len(tied), "errs", "err alike,")
     text = f"with N_D = {N_D} {join_few_names(tied)} {err} least{over}, {number_text(best.H_end)} m at the horizon, "
     text += f"H {number_text(best.H)} m"

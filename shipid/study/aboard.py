@@ -22,6 +22,7 @@ from shipid.report.content import SummaryLine
 from shipid.study.apply import (
     BandSettings,
     Forecast,
+    faults_of_log,
     instants_along,
     is_kind_new,
     limits_in_words,
@@ -93,7 +94,8 @@ def play_aboard(
         rows, early = _due_rows(piece["t"].to_numpy(), every or step, predictor.past * step)
         skipped += early
         if len(rows):
-            forecast, latency = _forecast_row_by_row(predictor, dataset, piece, rows, band)
+            with faults_of_log(log):
+                forecast, latency = _forecast_row_by_row(predictor, dataset, piece, rows, band)
             path, one = tables_along(predictor, run, piece, forecast, band)
             points.append(path)
             instants.append(one.assign(latency=latency))
@@ -209,7 +211,8 @@ def _errors_ahead(played: Replay) -> list[str]:
     table = pd.DataFrame(columns).rename_axis("s ahead").reset_index()
     formats = {"s ahead": "{:g}".format} | dict.fromkeys(columns, length_text)
     text = table.to_string(index=False, col_space=11, na_rep="-", formatters=formats)
-    return ["error where the log goes on, and band [m]:", *text.splitlines()]
+    band = "" if played.band is None else ", and band"
+    return [f"error where the log goes on{band} [m]:", *text.splitlines()]
 
 
 def _band_in_words(played: Replay, band: BandSettings) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,6 +45,7 @@ from shipid.units import length_text, percent_text, plural_word
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
+NO_PATH_ALONE = "a mean of foundations has no physics of its own: its path of physics alone is empty"
 COOPERATIVE_COLUMNS = ("cooperative_north", "cooperative_east")
 
 
@@ -108,7 +110,8 @@ def predict_log(
         predictor.check_level(level, kind)
     dataset = read_or_import(log, mapping, predictor.vessels)
     band = None if level is None else BandSettings(level, kind, rate)
-    tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in stretches_of_runs(dataset)]
+    with faults_of_log(log):
+        tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in stretches_of_runs(dataset)]
     parts = [table for table in tables if len(table)]
     if not parts:
         steps = predictor.past + (predictor.physics.horizon if predictor.commands == "known" else 0)
@@ -122,6 +125,15 @@ def predict_log(
     frame.attrs["errors"] = _errors_in_words(errors[:, np.isfinite(errors).all(axis=0)], step)
     frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step), "limits": limits}
     return frame, float(frame["outside"].mean())
+
+
+@contextmanager
+def faults_of_log(log: Path) -> Iterator[None]:
+    """Give a DataError of the block the file of the log."""
+    try:
+        yield
+    except DataError as error:
+        raise DataError(error.message, file=error.file or log, path=error.path) from None
 
 
 def table_of_stretch(
@@ -142,7 +154,7 @@ def table_of_stretch(
 
 
 def limits_in_words(predictor: Predictor, dataset: Dataset, diverged: pd.Series[bool]) -> list[str]:
-    """Why errors along a log may mislead: its runs trained the predictor, or the physics diverges from instants."""
+    """Limits of what is told along a log: its runs trained, the physics diverges, a mean has no path of its own."""
     trained = set(predictor.provenance.get("runs", ())).intersection(dataset.runs)
     many = f"{len(trained)} of {len(dataset.runs)} {plural_word(len(dataset.runs), 'run')}"
     lost = f"physics diverges on {percent_text(diverged.mean(), 1)} of the instants"
@@ -151,6 +163,7 @@ def limits_in_words(predictor: Predictor, dataset: Dataset, diverged: pd.Series[
         if trained
         else "",
         f"{lost}: paths there go no farther than the present speed takes the ship" if diverged.any() else "",
+        NO_PATH_ALONE if isinstance(predictor.corrector, MeanCorrector) else "",
     )
     return [*filter(None, texts)]
 

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
 
 NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms", "A_end", "A_end_90"), np.nan)  # of no physics
+EQUAL_WEIGHTS = "weights are equal: errors on runs left out need `bands.refits`, such as 5"
 Errors = dict[tuple[str, str], tuple[Array, float]]
 
 
@@ -250,7 +251,7 @@ def evaluate_mean(
     if len(errors) == len(parts):
         weights, mean_errors = weigh_errors(np.stack(errors), work.windows.run, by_left_out=foundation.by_left_out)
     elif foundation.by_left_out:
-        notes.append("weights are equal: errors on runs left out need `bands.refits`, such as 5")
+        notes.append(EQUAL_WEIGHTS)
     first = predictors[0]
     predictor = replace(
         first,

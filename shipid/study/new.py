@@ -52,7 +52,6 @@ is above this share of the way: jitter grows by 1, scatter that adds up by sqrt(
 Shares of the way: a towing carriage 1e-4, jitter of 0.3 m on a ship of 30 m 0.008, GPS of some metres 0.09
 (`test_recorded_sets`).
 """
-RUNS_FOR_FOLDS, PROPOSED_FOLDS = 6, 3
 MANOEUVRES, TEST_MANOEUVRES, INSTANTS_A_MANOEUVRE = 60, 10, 50  # of a simulated study
 PAST_LENGTHS, LEAST_PAST_STEPS = 1.5, 8  # L / U: of 0.8, 1.5, 2.5 and 11.6 sqrt(L / g) the best on four ships; steps
 LAGS_OF_MEMORY = (0.1, 0.2, 0.4, 0.5, 1.0)  # shares of the past
@@ -196,7 +195,11 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     steps = Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s")
     least = [Choice("grid.N_D", [LEAST_AMOUNT]), *([Choice("family", families[:1])] if families else [])]
     plan = build_plan(tomllib.loads(_study_text([*fixed, steps, *least])), out, vessels)
-    fixed += _folds_and_grid(amounts_of_data(len(partition(plan, dataset)[0].spans)))
+    amounts = amounts_of_data(len(partition(plan, dataset)[0].spans))
+    fixed += [
+        Choice("split.folds", 1, f"{amounts[-1]} runs train: each validates in turn"),
+        Choice("grid.N_D", amounts, f"runs for training and validation: from the fewest to all; {DRAWS_OF_FEW}"),
+    ]
     failed = _warn_of_failed_checks(seen, data)
     try:
         choices, plan, notes = _first_that_runs(fixed, steps, families, out, vessels, dataset)
@@ -288,17 +291,6 @@ def _why_test(seen: Survey, tests: Sequence[str]) -> str:
     return f"in the middle of their kind: {', '.join(words)}. Never look at them while you choose models"
 
 
-def _folds_and_grid(amounts: list[int]) -> list[Choice]:
-    total = amounts[-1]
-    folds = Choice("split.folds", PROPOSED_FOLDS, f"{total} runs: two thirds train, one third validates, in turn")
-    if total < RUNS_FOR_FOLDS:
-        folds = Choice("split.folds", 1, f"{total} runs train: each validates in turn")
-    return [
-        folds,
-        Choice("grid.N_D", amounts, f"runs for training and validation: from the fewest to all; {DRAWS_OF_FEW}"),
-    ]
-
-
 def _claims_of_families(families: Sequence[str]) -> list[Choice]:
     """Which family each finding speaks of; none where there is nothing to compare."""
     if INACCURATE in families:
@@ -376,7 +368,7 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         _turning_orders(controls, service, rpm),
         *_ordinary_sensors(length, service),
         Choice("split.test", TEST_MANOEUVRES, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
-        Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
+        Choice("split.folds", 1, "every run validates in turn"),
         Choice("prediction.ahead", float(f"{ahead:.9g}"), why),
         Choice("prediction.interval", step, "s between instants of prediction"),
         Choice("prediction.samples", INSTANTS_A_MANOEUVRE, "instants a manoeuvre"),
@@ -389,7 +381,7 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
 
 
 def _proposed_method(passing: float, step: float, spare: float, of: str = "L/U") -> Choice:
-    """Compensation of the path with a memory, which validation may refuse; without one where runs are too short.
+    """Kernel ridge regression on the path with a memory; without one where runs are too short.
 
     passing : time [s] in which the ship runs its length; 0: not known. of : what it is, behind a number.
     spare : time [s] of the median run beyond the horizon; a third of it may be past.
@@ -400,17 +392,17 @@ def _proposed_method(passing: float, step: float, spare: float, of: str = "L/U")
             f"no memory: a past of {past:.3g} s, {PAST_LENGTHS:g} L/U or a third of what the median run holds beyond "
             f"the horizon, is below {LEAST_PAST_STEPS} steps"
         )
-        return Choice("method", [{"name": "drawn", "kind": "path-drawn"}], why)
+        return Choice("method", [{"name": "instant", "kind": "kernel"}], why)
     lags = [
         float(f"{lag:.6g}") for lag in sorted({step * max(round(share * past / step), 1) for share in LAGS_OF_MEMORY})
     ]
-    memory = {"history": lags[:-2], "turned": lags[-2:], "error": [lags[-3]]}
+    memory = {"history": lags[:-2], "turned": lags[-2:], "positions": lags[1:], "error": [lags[-3]]}
     why = (
-        f"inputs of the last {lags[-1]:g} s, {past / passing:.2g} {of}: what ship and orders did, and what the physics "
-        "got wrong; validation chooses how much of it is taken. The first instants of a run are left out: they have no "
-        "past"
+        f"inputs of the last {lags[-1]:g} s, {past / passing:.2g} {of}: where ship and orders were, and what the "
+        "physics got wrong; runs left out choose the length scale of each group. The first instants of a run are left "
+        "out: they have no past"
     )
-    return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
+    return Choice("method", [{"name": "memory", "kind": "kernel", "memory": memory}], why)
 
 
 def _past_of_method(method: Choice) -> float:

@@ -36,7 +36,8 @@ FORESEEN = 0.2  # times the least error that can be believed: less is knowledge 
 class RivalPrediction(NamedTuple):
     """A prediction of somebody else on the test windows.
 
-    label : its name, and whether it is `not blind` or `doubtful`; `given` where a method of the study has its name.
+    label : its name, and whether it is `not blind` or `doubtful`; `given` where the study has a method or foundation
+        of its name.
     paths : (T, S, 2) [m] in the frame (11).
     N_D, seed : -1 for any. doubt : what seems to be wrong with it, in one sentence; empty where nothing does.
     """
@@ -81,7 +82,8 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
         raise DataError("a name is missing, or every row: give each step of each window", file=file, path="model")
     for (model, N_D, seed), part in groups.groupby(["model", "N_D", "seed"], sort=False):
         places = _ordered_places(part, results.test, file)
-        doubt, known = doubt_of_places(places, results), {way.name for way in results.plan.methods}
+        plan, doubt = results.plan, doubt_of_places(places, results)
+        known = {way.name for way in plan.methods} | {one.name for one in plan.foundations}
         marks = {"not blind": not blind, "doubtful": bool(doubt), "given": str(model) in known}
         words, paths = [word for word, holds in marks.items() if holds], path_of_places(places, results.test)
         label = f"{model} ({', '.join(words)})" if words else str(model)

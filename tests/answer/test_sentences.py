@@ -43,7 +43,7 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, H of good (best in validation) is 1.50 m. " in advice
     assert f"Without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
-    assert "With 60 runs, every compared model beats constant u, v, r (H 10.0 m)." in advice
+    assert "With 10 and 60 runs, every compared model beats constant u, v, r (H 10.0 m)." in advice
     assert "With 60 runs, 1 of 2 physics models does better than no physics: good; bad does worse." in advice
 
 
@@ -123,9 +123,11 @@ def test_data_that_did_not_help_is_reported(made: Any) -> None:
 
 def test_constant_u_v_r_that_are_not_beaten(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=2.5))
-    assert 'Constant u, v, r (H 2.50 m) beat "no physics".' in advice
+    assert 'With 10 runs constant u, v, r (H 2.50 m) beat bad and "no physics".' in advice
+    assert 'With 30 runs constant u, v, r (H 2.50 m) beat "no physics".' in advice
+    assert "every compared model beats" not in advice
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (5.0, 2.0), "none": (4.0, 3.0)}), naive=1.9))
-    assert 'Constant u, v, r (H 1.90 m) beat bad and "no physics".' in advice
+    assert 'With 30 runs constant u, v, r (H 1.90 m) beat bad and "no physics".' in advice
 
 
 def test_test_manoeuvres_become_an_interval_and_seeds_do_not(made: Any) -> None:

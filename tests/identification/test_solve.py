@@ -535,3 +535,20 @@ def test_a_start_that_leads_to_a_worse_optimum_than_the_base_is_left() -> None:
     solution = identify(ship, data, data.runs, given)
     assert solution.status == "ok"
     assert solution.objective < solution.objective_start
+
+
+def test_where_the_default_step_diverges_it_is_halved_and_said() -> None:
+    """A craft whose yaw follows its screws within a tenth of a second; a step that is given stays."""
+    path = "hull.derivatives.N_r"
+    craft = load_vessel("otter").with_values({path: 12 * load_vessel("otter").parameters[path]})
+    turning = {**orders(craft, 3, 400, 1), "starboard.n": np.zeros((401, 3))}
+    dataset = trials(craft, runs=3, steps=400, step=0.1, true_commands=turning)
+    dataset = changed(dataset, **{"starboard.n": np.zeros(len(dataset.frame))})
+    some = {"parameters": [path], "weights": {"u": 0.01, "v": 0.01, "r": 0.01}, "current": "none"}
+    assert identify(craft, dataset, dataset.runs, Identify(**some, step=1.0)).status == "diverged"
+    solution = identify(craft, dataset, dataset.runs, Identify(**some))
+    assert (solution.status, solution.warnings[0]) == (
+        "ok",
+        f"predictions diverge in steps of 1 s, the default: steps are {solution.settings.step:g} s",
+    )
+    assert solution.factors == pytest.approx(1.0, abs=0.2)  # orders change within a step

@@ -64,18 +64,19 @@ def three(H: tuple[float, float, float], **more: list[object]) -> str:
 
 def test_methods_that_err_alike_are_named_together() -> None:
     assert three((2.0, 2.0 * (1 + 1e-15), 2.5)) == (
-        "With N_D = 3 a and b err alike, least over all cells with physics, 5.00 m at the horizon, H 2.00 m "
+        "With N_D = 3 a and b err alike, least in the mean over all foundations with physics, "
+        "5.00 m at the horizon, H 2.00 m "
         "(c is next, its difference of H to a is 0.50 % [0.00, 1.00])."
     )
     assert (
-        "b and c err alike, least over all cells with physics, 5.00 m at the horizon, H 1.00 m (their difference"
-        in three((2, 1, 1))
+        "b and c err alike, least in the mean over all foundations with physics, "
+        "5.00 m at the horizon, H 1.00 m (their difference" in three((2, 1, 1))
     )
 
 
 def test_a_method_that_lacks_a_cell_is_named() -> None:
     rivals = three((9.0, 2.0, 3.0), missing=[1, 0, 1], failed=[1, 0, 0])
-    assert "b errs least over all cells with physics, 5.00 m at the horizon, H 2.00 m" in rivals
+    assert "b errs least in the mean over all foundations with physics, 5.00 m at the horizon, H 2.00 m" in rivals
     assert ", without a result: a (1 of 4) (left out: c," in rivals
 
 

@@ -181,7 +181,17 @@ def test_runs_that_trained_and_physics_that_diverges_are_said(banded, tmp_path):
         assert f"diverges on {percent_text(played.instants['diverged'].mean(), 1)}" in text
         legs = played.points.assign(way=np.hypot(played.points["north"], played.points["east"]))
         assert np.isfinite(legs["way"]).all()
-    assert not play_aboard(banded[1], saved(frame, tmp_path)).limits
+    played = play_aboard(banded[1], saved(frame, tmp_path))
+    assert not played.limits
+    assert "band" not in " ".join(line.text for line in replay_summary(played))
+
+
+def test_a_log_without_an_input_of_the_training_is_one_line_with_its_file(tmp_path):
+    file = drawn("path-drawn", 6, vessel="gunnerus-28.9").predictor.save(tmp_path / "cell.npz")
+    rows = log().rename(columns={"propeller.n": "port.n", "rudder.delta": "port.alpha"})
+    rows = rows.assign(**{"starboard.n": rows["port.n"], "starboard.alpha": rows["port.alpha"], "t": np.arange(60.0)})
+    with pytest.raises(DataError, match=r"log.parquet: phi: the compensator needs this column"):
+        play_aboard(file, saved(rows, tmp_path))
 
 
 def test_a_heading_in_degrees_is_one_line(banded, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from pandas.testing import assert_frame_equal
 from shipid.answer.findings import _errors_by_step
 from shipid.answer.methods import WITH_PHYSICS, method_cells, method_table
 from shipid.answer.pages import write_pages
+from shipid.answer.sentences import answer_sentences
 from shipid.data.windows import to_frame
 from shipid.errors import DocumentError
 from shipid.predictor import Predictor
-from shipid.study.apply import predict_log
+from shipid.study.apply import NO_PATH_ALONE, predict_log
+from shipid.study.cells import EQUAL_WEIGHTS
 from shipid.study.plan import Batch, Plan, build_plan
 from shipid.study.results import read_results
 from shipid.study.store import cell_file
@@ -79,8 +82,14 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     _, folder = finished
     write_pages(folder)
     answer, summary = (folder / "answer.txt").read_text(), (folder / "summary.md").read_text()
-    assert "The mean equal of foundations has H " in answer
+    assert " equal, a mean of foundations, has H " in answer
     assert "| equal " in summary
+    for row in (one for one in read_results(folder).rows if one["foundation"] == "weighed"):
+        equal = np.ptp(Predictor.load(cell_file(folder, row["cell"])).corrector.weights) == 0  # type: ignore[attr-defined]
+        assert (EQUAL_WEIGHTS in row["sentence"]) == (row["method"] != "drawn") == equal
+    assert f"ok: {EQUAL_WEIGHTS}" in summary
+    assert EQUAL_WEIGHTS not in answer
+    assert EQUAL_WEIGHTS in _answer_of_method("trained", finished)
     results = read_results(folder)
     counted = [line for line in answer.splitlines() if "physics models do" in line]
     assert all("equal" not in line and "weighed" not in line for line in counted)
@@ -89,6 +98,13 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     cells = method_cells(results)
     tables = [method_table(one, "drawn") for one in (cells, cells[~cells["family"].isin(["equal", "weighed"])])]
     assert_frame_equal(*(one[one["family"] == WITH_PHYSICS].reset_index(drop=True) for one in tables))
+
+
+def _answer_of_method(name: str, finished: tuple[Plan, Path]) -> str:
+    plan, folder = finished
+    judged = [way for way in plan.methods if way.name == name]
+    results = read_results(folder)
+    return " ".join(text for text, _ in answer_sentences(replace(results, plan=replace(results.plan, methods=judged))))
 
 
 def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
@@ -108,6 +124,7 @@ def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
     assert said.startswith("mad: physics diverges on ")
     assert any(text.startswith("physics diverges on ") for text in frame.attrs["limits"])
     assert frame["physics_north"].isna().all()
+    assert NO_PATH_ALONE in frame.attrs["limits"]
     test, steps = results.test, results.test.horizon
     for place in range(0, len(test), 3):
         rows = frame[(frame["run"] == test.run[place]) & np.isclose(frame["t"], test.t[place])]

@@ -138,6 +138,13 @@ def test_a_file_that_is_no_table_is_told_in_one_line(
     assert "\n" not in str(error.value)
 
 
+def test_a_name_of_the_study_is_marked(tmp_path: Path, results: Results) -> None:
+    path = next(iter(results.paths.values()))
+    for name, label in (("path-drawn", "path-drawn (given)"), ("wrong-1", "wrong-1 (given)"), ("own", "own")):
+        file = written(tmp_path / "p.parquet", results, path, model=name)
+        assert [one.label for one in read_predictions(file, results)] == [label]
+
+
 def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blind(
     tmp_path: Path, results: Results
 ) -> None:
@@ -150,7 +157,9 @@ def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blin
     assert same["difference"] == pytest.approx(100 * np.expm1(np.mean(ratios)))
     assert (shipid.compare_methods(results)["method"] == "rival").sum() == 3
     with without_figures():
-        assert f"rival: at the horizon {cell['H_end']:.4g} m" in output_of("study", "score", results.folder, file)
+        said = output_of("study", "score", results.folder, file)
+        assert f"rival: at the horizon {cell['H_end']:.4g} m" in said
+        assert f"H {cell['H']:.4g} m; beside N_D 4\n" in said
     # the tables carry it, also beside the predictions, and the folder of the run remembers it
     with pytest.raises(DataError, match="'rival' is scored already, from another table"):
         shipid.score(

@@ -1,0 +1,71 @@
+"""Methods on the windows of `quick`, each with its core-seconds, from one run in turn.
+
+`python docs/records.py rivals python docs/rivals.py FOLDER`. All meet moderate-1, high-1 and no physics with 10, 30 and
+100 runs; those that take long meet moderate-1 with 30 runs. Settings are defaults, but for what is named here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from shipid import read_plan
+from shipid.metrics import position_error
+from shipid.study.results import read_results
+from shipid.study.run import run_study
+
+PAST = {"history": [2.0, 4.0, 8.0], "turned": [10.0, 20.0], "error": 8.0}  # s
+BEFORE = {"trials": 24, "choose": True, "memory": PAST}  # of `quick` until 29 November 2026
+FAST: tuple[dict[str, Any], ...] = (
+    {"kind": "path-drawn", **BEFORE},
+    {"kind": "hankel-dmd", "families": ["moderate", "high", "none"]},
+    {"kind": "one-step", "families": ["moderate", "high", "none"]},
+)
+SLOW: tuple[dict[str, Any], ...] = (
+    {"kind": "path-refined", **BEFORE},
+    {"kind": "calibrator", "trials": 24, "memory": PAST},
+    {"kind": "forest", "memory": PAST},
+    {"kind": "recurrent"},
+    {"kind": "path-trained", "trials": 24},
+)
+CHANGES: dict[str, Any] = {"family.0.members": 1, "family.1.members": 1, "grid.seeds": [0]}
+
+
+def run_methods(folder: Path, others: tuple[dict[str, Any], ...], amounts: list[int]) -> dict[str, dict[str, str]]:
+    """Method -> column -> H [m] and core-seconds of a cell; `quick` is run once."""
+    own = read_plan("quick").document["method"]
+    blocks = [*own, *({"name": one["kind"], "families": ["moderate"], **one} for one in others)]
+    if others is FAST:
+        blocks = [block | {"families": ["*"]} if block["name"] == "path-drawn" else block for block in blocks]
+    for event in run_study(read_plan("quick", CHANGES | {"grid.N_D": amounts, "method": blocks}), folder, workers=1):
+        print(event.text, file=sys.stderr)
+    results, table = read_results(folder), {}
+    for row in results.rows:
+        name = own[0]["kind"] if row["method"] == own[0]["name"] else row["method"]
+        error = f"{row['H']:.3f} ({row['seconds']:.1f})" if row["status"] == "ok" else row["status"]
+        table.setdefault(name, {})[f"{row['model'].split(' + ')[0]}, {row['N_D']}"] = error
+    for batch in results.plan.batches:
+        error = position_error(results.regression[batch.key], results.test.future).mean()
+        table.setdefault("regression", {})[f"none, {batch.N_D}"] = f"{error:.3f}"
+        table.setdefault("constant u, v, r", {})[f"none, {batch.N_D}"] = f"{results.naive.mean():.3f}"
+    return table
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="new folder for the two runs")
+    folder = parser.parse_args().folder
+    print("H [m] on the test of `quick`, core-seconds of the cell in brackets.")
+    for name, others, amounts in (("fast", FAST, [10, 30, 100]), ("slow", SLOW, [30])):
+        table = run_methods(folder / name, others, amounts)
+        columns = [f"{model}, {N_D}" for model in ("moderate-1", "high-1", "none") for N_D in amounts]
+        print(f"\n| method | {' | '.join(columns)} |\n| --- |{' ---: |' * len(columns)}")
+        for method, cells in table.items():
+            print(f"| {method} | {' | '.join(cells.get(column, '') for column in columns)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
