@@ -1,7 +1,7 @@
 """Methods on the windows of `quick`, each with its core-seconds, from one run in turn.
 
-`python docs/records.py rivals python docs/rivals.py FOLDER`. All meet moderate-1, high-1 and no physics with 10, 30 and
-100 runs; those that take long meet moderate-1 with 30 runs. Settings are defaults, but for what is named here.
+`python docs/records.py rivals python docs/rivals.py FOLDER`. All meet the first member of moderate and of high, and no
+physics, with 10, 30 and 100 runs; those that take long meet moderate with 30 runs. Settings are defaults, but for what is named here.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def main() -> None:
     print("H [m] on the test of `quick`, core-seconds of the cell in brackets.")
     for name, others, amounts in (("fast", FAST, [10, 30, 100]), ("slow", SLOW, [30])):
         table = run_methods(folder / name, others, amounts)
-        columns = [f"{model}, {N_D}" for model in ("moderate-1", "high-1", "none") for N_D in amounts]
+        columns = [f"{model}, {N_D}" for model in ("moderate", "high", "none") for N_D in amounts]
         print(f"\n| method | {' | '.join(columns)} |\n| --- |{' ---: |' * len(columns)}")
         for method, cells in table.items():
             print(f"| {method} | {' | '.join(cells.get(column, '') for column in columns)} |", flush=True)

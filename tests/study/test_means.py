@@ -89,8 +89,9 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
         assert (EQUAL_WEIGHTS in row["sentence"]) == (row["method"] != "drawn") == equal
     assert f"ok: {EQUAL_WEIGHTS}" in summary
     assert EQUAL_WEIGHTS not in answer
-    assert EQUAL_WEIGHTS in _answer_of_method("trained", finished)
     results = read_results(folder)
+    trained = replace(results.plan, methods=[way for way in results.plan.methods if way.name == "trained"])
+    assert EQUAL_WEIGHTS in " ".join(text for text, _ in answer_sentences(replace(results, plan=trained)))
     counted = [line for line in answer.splitlines() if "physics models do" in line]
     assert all("equal" not in line and "weighed" not in line for line in counted)
     assert results.complete
@@ -98,13 +99,6 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     cells = method_cells(results)
     tables = [method_table(one, "drawn") for one in (cells, cells[~cells["family"].isin(["equal", "weighed"])])]
     assert_frame_equal(*(one[one["family"] == WITH_PHYSICS].reset_index(drop=True) for one in tables))
-
-
-def _answer_of_method(name: str, finished: tuple[Plan, Path]) -> str:
-    plan, folder = finished
-    judged = [way for way in plan.methods if way.name == name]
-    results = read_results(folder)
-    return " ".join(text for text, _ in answer_sentences(replace(results, plan=replace(results.plan, methods=judged))))
 
 
 def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
