@@ -486,7 +486,7 @@ def _cut_files(
     mapping: Mapping, each: list[tuple[str, ImportedLog]], logs: PlainMapping[str, Path]
 ) -> tuple[pd.DataFrame, Records]:
     """The runs of several files: the segments of each, the whole file where it has none; rows in none are counted."""
-    unit, frames, records = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), list[Records]()
+    unit, frames, left = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), 0
     for index, one in enumerate(mapping.segment):
         if one.file not in logs or one.run in logs.keys() - {one.file}:
             file, path = next(iter(logs.values())).parent, f"segment.{index}"
@@ -501,8 +501,10 @@ def _cut_files(
             _cut_into_runs(part.rows, inside, unit, logs[run]) if inside else (_name_run(part.rows, run), [])
         )
         frames.append(frame)
-        records.append(outside)
-    return pd.concat(frames, ignore_index=True), _add_records(records)
+        left += sum(one["count"] for one in outside)
+    rows = sum(len(part.rows) for _, part in each)
+    record = {"kind": "left out", "column": "", "count": left, "note": f"of {rows} rows: in no segment"}
+    return pd.concat(frames, ignore_index=True), [record] if left else []
 
 
 def _split_runs(log: ImportedLog, name: str) -> Iterator[pd.DataFrame]:

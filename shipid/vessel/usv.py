@@ -79,8 +79,8 @@ class SmallCraft:
 def guess_craft(given: SmallCraft, name: str, file: str) -> FirstGuess:
     """Fill a vessel document of a small craft; ShipidError for one that cannot be, or that nothing steers."""
     _check_craft(given)
-    speed = CRUISE * given.top_speed
-    return finish_guess(_craft_lines(given, name, speed), file, speed, tuple(_craft_remarks(given)), unit="N")
+    lines, remarks = _craft_lines(given, name), tuple(_craft_remarks(given))
+    return finish_guess(lines, file, CRUISE * given.top_speed, remarks, unit="N")
 
 
 def _check_craft(given: SmallCraft) -> None:
@@ -131,19 +131,18 @@ def _hull_values(given: SmallCraft, added: Values) -> Values:
     }
 
 
-def _craft_lines(given: SmallCraft, name: str, speed: float) -> Iterator[str]:
+def _craft_lines(given: SmallCraft, name: str) -> Iterator[str]:
     """The document, line by line."""
     L, one, apart = given.length, given.hull, (given.beam - given.hull.beam) / 2 if given.count == 2 else 0.0
-    note = f"of {given.count} hulls" if given.count == 2 else "of the hull"
     yield from head_lines(
         name,
         {
             "L_pp": TemplateValue(L, "m", "given"),
             "B": TemplateValue(given.beam, "m", "given"),
             "T": TemplateValue(
-                one.draught, "m", f"carries the mass, C_b {one.block:g} and beam {one.beam:.3g} m {note}"
+                one.draught, "m", f"carries the mass, C_b {one.block:g} and beam {one.beam:.3g} m of each hull"
             ),
-            "U_0": TemplateValue(speed, "m s^-1", f"{CRUISE:g} of the top speed: a guess"),
+            "U_0": TemplateValue(CRUISE * given.top_speed, "m s^-1", f"{CRUISE:g} of the top speed: a guess"),
         },
         RHO_SEA,
     )
@@ -169,10 +168,9 @@ def _craft_lines(given: SmallCraft, name: str, speed: float) -> Iterator[str]:
     yield from block_lines("hull.crossflow", drag, strips=20)
     sides: list[str] = []
     for x, y in given.thrusters:
-        side = "port" if y < 0 else "starboard" if y > 0 else "middle"
-        sides.append(side)
-        again = f"_{sides.count(side)}" if sides.count(side) > 1 else ""
-        yield from _thruster_block(given, f"thruster.{side}{again}", x, y)
+        sides.append("port" if y < 0 else "starboard" if y > 0 else "middle")
+        again = f"_{sides.count(sides[-1])}" if sides.count(sides[-1]) > 1 else ""
+        yield from _thruster_block(given, f"thruster.{sides[-1]}{again}", x, y)
 
 
 def _thruster_block(given: SmallCraft, path: str, x: float, y: float) -> Iterator[str]:

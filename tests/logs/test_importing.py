@@ -371,7 +371,8 @@ def test_segments_of_several_files_cut_those_that_they_name_and_leave_the_others
     times = {run: part["t"].tolist() for run, part in data.frame.groupby("run")}
     assert times == {"drive 1": [1, 2, 3], "drive 2": [4, 5, 6, 7, 8], "b": [*range(10)]}
     assert data.metadata["manoeuvres"] == {"drive 1": "mixed"}
-    assert [one["count"] for one in data.metadata["repairs"] if one["kind"] == "left out"] == [2]
+    left = [(one["count"], one["note"]) for one in data.metadata["repairs"] if one["kind"] == "left out"]
+    assert left == [(2, "of 20 rows: in no segment")]
     for wrong, message in (('file = "c"', "no file 'c'"), ('run = "b"', "a run 'b' exists")):
         written = SEGMENTS.replace('file = "a"' if "file" in wrong else 'run = "drive 2"', wrong)
         with pytest.raises(DataError, match=message):

@@ -52,7 +52,7 @@ BROKEN = {
     "family-with-a-slash": ("family.a/b.name", "'a/b'"),
     "family-beside-families": ("family", "5: must be a list"),
     "families-of-itself": ("families", "families-of-itself.toml takes its families from elsewhere itself: name that"),
-    "no-families": ("family", "must be a list of 1 or more entries (it has 0)"),
+    "no-families": ("", "only recorded runs can be studied without physics"),
     "more-data-than-runs": ("grid.N_D", "12 manoeuvres less 4 test runs leave 8"),
     "empty-grid": ("grid.N_D", "must be a list of 1 or more entries (it has 0)"),
     "no-run-for-training": ("grid.N_D.0", "must be at least 1"),
