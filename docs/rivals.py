@@ -1,7 +1,8 @@
 """Methods on the windows of `quick`, each with its core-seconds, from one run in turn.
 
 `python docs/records.py rivals python docs/rivals.py FOLDER`. All meet the first member of moderate and of high, and no
-physics, with 10, 30 and 100 runs; those that take long meet moderate with 30 runs. Settings are defaults, but for what is named here.
+physics, with 10, 30 and 100 runs; those that take long meet moderate with 30 runs. Settings are defaults, but for
+what is named here.
 """
 
 from __future__ import annotations
