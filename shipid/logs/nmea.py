@@ -186,7 +186,7 @@ def _day_number(text: str) -> float:
     return float(day.dt.days.iloc[0])
 
 
-def read_nmea(file: Path, form: NmeaFormat, _: str, progress: Callable[[float], None] | None = None) -> pd.DataFrame:
+def read_nmea(file: Path, form: NmeaFormat, _: object, progress: Callable[[float], None] | None = None) -> pd.DataFrame:
     """Sentences as rows: `time` [s] and columns of their values, NaN where a sentence has no value.
 
     The talker who says a column most often has it; others have columns with their letters, such as `heading_GP`.

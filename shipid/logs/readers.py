@@ -10,7 +10,7 @@ import io
 import re
 import stat
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -22,10 +22,23 @@ import pyarrow
 
 from shipid.errors import DataError
 from shipid.files import read_arrow
+from shipid.logs.dataflash import is_dataflash, read_dataflash
 from shipid.logs.foreign import ENOUGH, refuse_foreign
-from shipid.logs.formats import LOOKED_AT, Format, MatFormat, NmeaFormat, ParquetFormat, SheetFormat, TextFormat
+from shipid.logs.formats import (
+    LOOKED_AT,
+    Format,
+    MatFormat,
+    NmeaFormat,
+    ParquetFormat,
+    SheetFormat,
+    TextFormat,
+    TopicsFormat,
+)
 from shipid.logs.mat import is_mat, read_mat
 from shipid.logs.nmea import is_nmea, read_nmea
+from shipid.logs.rosbag import is_bag, read_bag
+from shipid.logs.topics import TopicReader, reads_topics, topic_rows
+from shipid.logs.ulog import is_ulog, read_ulog
 from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_with_values
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
@@ -65,7 +78,7 @@ def read_log_table(
         if isinstance(form, TextFormat) and size > LARGE and columns:
             table = _large_text(file, form, {clock, *columns}, progress, size)
         if table is None:
-            table = READERS[form.kind].read(file, form, clock, progress)
+            table = READERS[form.kind].read(file, form, (clock, *columns), progress)
     except OSError as error:
         if error.errno is None:  # of a library, not of the system
             raise DataError(
@@ -477,15 +490,17 @@ class LogReader:
     """One format of logs.
 
     options : model of the keys of [format] in a mapping.
-    read : (file, options, name of the column of time, progress as of `read_log_table`) -> table; raises DataError.
+    read : (file, options, columns as of `read_log_table`, that of time first, progress) -> table; raises DataError.
     detect : (file, its first bytes) -> keys of [format] where it is of this format, else None; without it, no guess.
-    scattered : whether rows are single sentences that do not say everything, so that empty cells are no defect.
+    scattered : whether rows are single sentences or messages that do not say everything: empty cells are no defect.
+    topics : the reader of the topics of a recording.
     """
 
     options: type[Format]
-    read: Callable[[Path, Any, str, Progress | None], pd.DataFrame]
+    read: Callable[[Path, Any, Sequence[str], Progress | None], pd.DataFrame]
     detect: Callable[[Path, bytes], dict[str, Any] | None] | None = None
     scattered: bool = False
+    topics: TopicReader | None = None
 
 
 def _is_sheet(_: Path, head: bytes) -> dict[str, Any] | None:
@@ -502,5 +517,23 @@ READERS: dict[str, LogReader] = {
     "parquet": LogReader(ParquetFormat, _read_parquet, _is_parquet),
     "mat": LogReader(MatFormat, read_mat, is_mat),
     "nmea": LogReader(NmeaFormat, read_nmea, is_nmea, scattered=True),
+    "rosbag": LogReader(TopicsFormat, reads_topics(read_bag), is_bag, True, read_bag),
+    "ulog": LogReader(TopicsFormat, reads_topics(read_ulog), is_ulog, True, read_ulog),
+    "dataflash": LogReader(TopicsFormat, reads_topics(read_dataflash), is_dataflash, True, read_dataflash),
 }
 """Kind, as in [format] of a mapping -> reader. To add a format: its options, its two functions, a row here."""
+
+
+def list_topics(file: Path) -> list[dict[str, Any]]:
+    """The topics of a recording: name, count of messages, their rate [Hz], and names of their fields.
+
+    Raises DataError where the file is no recording of topics.
+    """
+    require_file(file)
+    with file.open("rb") as stream:
+        head = stream.read(ENOUGH)
+    read = next((one.topics for one in READERS.values() if one.topics and one.detect and one.detect(file, head)), None)
+    if read is None:
+        kinds = ", ".join(name for name, one in READERS.items() if one.topics)
+        raise DataError(f"has no topics: recordings of these kinds have them: {kinds}", file=file)
+    return topic_rows(read(file, lambda _: True))

@@ -55,7 +55,7 @@ def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, A
     for reader in READERS.values():
         form = reader.detect(file, head) if reader.detect else None
         if form is not None:
-            return form
+            return form | ({"topics": list(names)} if reader.topics and names else {})
     encoding = _guess_encoding(head, file)
     text = head.decode(encoding, "ignore")
     if is_nmea(file, text.encode("latin-1", "replace")) is not None:

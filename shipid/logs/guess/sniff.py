@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -73,6 +74,8 @@ NOT_AVAILABLE = {
 """Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
 BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one that has so few values, an order, more
+QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
+"""How the names of x, y, z, w of a quaternion differ; numbers begin with the scalar, as in PX4 and ArduPilot."""
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
 SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
 """Names of columns that say the ship, in small letters alone, the surest first; what they hold for an unknown one."""
@@ -371,11 +374,11 @@ def _degree_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
 
 
 def _quaternion_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
-    """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these letters alone, and its size is 1."""
+    """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these alone, and its size is 1."""
     found: dict[str, tuple[str, ...]] = {}
-    for name in columns:
-        place = name.lower().rfind("w")
-        four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in ("XYZW" if "W" in name else "xyzw"))
+    for name, letters in itertools.product(columns, QUATERNIONS):
+        place = name.rfind(letters[3])
+        four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in letters)
         if place >= 0 and {*four} <= columns.keys():
             size = quaternion_size([columns[one] for one in four])
             known = np.isfinite(size) & (size > 0)
