@@ -26,6 +26,8 @@ from shipid.logs.formats import Format
 from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, source_columns
 from shipid.logs.repairs import Records
 
+SHORTEST = 1e-4  # s between rows, on average: no recorder of a ship has more than 10 kHz
+
 
 def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """The time of every row [s]; raises DataError where it is missing or does not rise."""
@@ -47,6 +49,9 @@ def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: 
             back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}{rollover_words(t[row] - t[row - 1])}"
             what = f"time goes back {back}: sort or split the log"
         raise DataError(what, file=file, path=row_in_words(log, row))
+    if len(t) > 1 and (t[-1] - t[0]) / (len(t) - 1) < SHORTEST:
+        what = f"rows are {(t[-1] - t[0]) / (len(t) - 1):.3g} s apart, as of no ship: is the unit of the clock right?"
+        raise DataError(what, file=file, path=f"{path}.unit")
     return t
 
 

@@ -127,7 +127,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
             head = stream.read(LONGEST_LINE)
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
-    if not head[:200_000].strip():
+    if not head[:200_000].strip(b" \t\r\n\xef\xbb\xbf\xff\xfe"):
         raise DataError("the file is empty", file=file)
     form = guess_format(head[:200_000], file, names)
     notes: tuple[str, ...] = ()
