@@ -351,14 +351,14 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
 def _check_limits(rows: pd.DataFrame, t: Array, numbered: pd.Index[int] | None, file: Path) -> None:
     """Raise DataError for a value that no ship has; t (N,) [s] and `numbered` are times and places of its rows."""
     for name in map(str, rows.columns.drop("flags", errors="ignore")):
-        unit, values = str(INPUTS.get(name) or unit_of_column(name)), rows[name]
-        if not (values.max() > LIMITS[unit] or values.min() < -LIMITS[unit]):
+        unit, values = str(INPUTS.get(name) or unit_of_column(name)), rows[name].to_numpy()
+        if not (np.fmax.reduce(values) > LIMITS[unit] or np.fmin.reduce(values) < -LIMITS[unit]):  # past NaN, fast
             continue
-        place = int(np.argmax(np.abs(values.to_numpy()) > LIMITS[unit]))
+        place = int(np.argmax(np.abs(values) > LIMITS[unit]))
         at = rows["t"].iloc[place]
         raise DataError(
-            f"{name} is {values.iloc[place]:.4g} {unit} at {format_moment(at)}, and no ship has more than "
-            f"{LIMITS[unit]:g}: is the unit right? List what stands for a missing value in [format] missing, or mend it by a despike",
+            f"{name} is {values[place]:.4g} {unit} at {format_moment(at)}, and no ship has more than {LIMITS[unit]:g}: "
+            "is the unit right? List what stands for a missing value in [format] missing, or mend it by a despike",
             file=file,
             path=f"columns.{name}" if numbered is None else f"row {int(numbered[np.searchsorted(t, at)]) + 1}",
         )

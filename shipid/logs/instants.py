@@ -23,7 +23,7 @@ from shipid.logs.dates import (
     time_texts,
 )
 from shipid.logs.formats import Format
-from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, source_columns
+from shipid.logs.mapping import RESTS, Clock, FileClock, Named, clock_seconds, is_dated, source_columns
 from shipid.logs.repairs import Records
 
 SHORTEST = 1e-4  # s between rows, on average: no recorder of a ship has more than 10 kHz
@@ -64,8 +64,8 @@ def read_time_column(
         if clock.date is None:
             return parse_dates(times)
         return parse_dates(join_date_and_time(_as_text(log, clock.date, date_texts, form, file, f"{path}.date"), times))
-    assert isinstance(clock.source, str)
-    return clock_seconds(parse_numbers(log, clock.source, form, file, f"{path}.from"), clock.unit)
+    whole, *rest = (parse_numbers(log, name, form, file, f"{path}.from") for name in source_columns(clock.source))
+    return clock_seconds(whole, clock.unit) + (RESTS[clock.unit] * rest[0] if rest else 0.0)
 
 
 def _as_text(

@@ -52,6 +52,8 @@ UNITS: dict[str, dict[str, float]] = {
         "s of week": 1.0,
         "ms of day": 1e-3,
         "ms of week": 1e-3,
+        "s + ns": 1.0,
+        "s + us": 1.0,
     },
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
@@ -66,14 +68,17 @@ UNITS: dict[str, dict[str, float]] = {
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
 `date`, `datenum`, `excel`, `mjd` and `jd` are read as seconds since 1970 (UTC), and so are the times of segments and
-breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes;
-`quaternion`, of the heading only, four columns x, y, z, w; `ais`, of the yaw rate only, the numbers of `rate_of_ais`.
+breaks; `hhmmss` as seconds since the first midnight; `s + ns` is of two columns, seconds and the rest of them.
+`ddmm`, of latitude and longitude only, are degrees and minutes; `quaternion`, of the heading only, four columns
+x, y, z, w; `ais`, of the yaw rate only, the numbers of `rate_of_ais`.
 """
 EPOCHS = {"datenum": 719529.0, "excel": float(EXCEL), "mjd": 40587.0, "jd": 2440587.5}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
 or not: IAU resolution B1 of 1997)."""
 AGAIN = {"s of day": DAY, "s of week": 7 * DAY, "ms of day": DAY, "ms of week": 7 * DAY}
 """Unit of a clock that begins again -> after how many seconds."""
+RESTS = {"s + ns": 1e-9, "s + us": 1e-6}
+"""Unit of a clock in two columns -> that of the second [s]."""
 SIDES = {"latitude": "NS", "longitude": "EW"}
 """Column of a position on the Earth -> the letters of its sides in a text, that of positive numbers first."""
 _BOTH = re.compile(r"([^A-Za-z]*\d[^A-Za-z]*[NS])[\s,;/]*([^A-Za-z]+[EW])|([NS][^A-Za-z]+?)[\s,;/]*([EW][^A-Za-z]+)")
@@ -631,7 +636,13 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
                 file=file,
                 path=f"{path}.date",
             )
-        if not isinstance(clock.source, str) and clock.unit != "date":
+        if clock.unit in RESTS and len(source_columns(clock.source)) != 2:
+            raise DocumentError(
+                f"{clock.unit!r} is of two columns: write from = [seconds, the rest of them]",
+                file=file,
+                path=f"{path}.from",
+            )
+        if not isinstance(clock.source, str) and clock.unit not in ("date", *RESTS):
             raise DocumentError(
                 "hour, minute and second in several columns are a time of day: write unit = 'date'",
                 file=file,

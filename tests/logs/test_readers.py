@@ -15,7 +15,7 @@ from shipid.logs.cells import log_column
 from shipid.logs.dates import parse_dates
 from shipid.logs.formats import ParquetFormat, TextFormat
 from shipid.logs.guess.sniff import recognise_log
-from shipid.logs.readers import check_line_width, read_log_table, require_file
+from shipid.logs.readers import parse_text, read_log_table, require_file
 from shipid.logs.workbook import WIDEST
 from tests.drawn import seeds
 from tests.logs.conftest import NAMES, assert_is_the_motion, mapping_with
@@ -150,13 +150,9 @@ def test_a_quote_that_is_never_closed_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("separator", [",", "whitespace"])
 @pytest.mark.parametrize(("cells", "refused"), [(WIDEST, False), (WIDEST + 1, True)])
 def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refused: bool) -> None:
-    mark = b" " if separator == "whitespace" else separator.encode()
-    head = b"t,u\n" + mark.join([b"a"] * cells) + b"\n"
-    if not refused:
-        check_line_width(head, separator, Path("log.csv"))
-        return
-    with pytest.raises(DataError, match=f"a line of more than {WIDEST} cells"):
-        check_line_width(head, separator, Path("log.csv"))
+    text = "t,u\n" + (" " if separator == "whitespace" else separator).join(["a"] * cells) + "\n"
+    with pytest.raises(DataError, match=f"a line of more than {WIDEST} cells" if refused else "not a table with this"):
+        parse_text(text, TextFormat(separator=separator), Path("log.csv"))
 
 
 def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: Path) -> None:

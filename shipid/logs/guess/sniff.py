@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import re
 from collections.abc import Iterator
@@ -43,7 +42,6 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import (
     LONGEST_LINE,
     READERS,
-    check_line_width,
     has_nul,
     in_points,
     parse_text,
@@ -138,11 +136,10 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     if isinstance(model, TextFormat):
         if has_nul(head, model):
             refuse_power_cut(head, file)
-        check_line_width(head, model.separator, file)
         sampled = size > SAMPLE
         lines = _text_sample(file, model.encoding, size)
     if isinstance(model, TableFormat):
-        table = parse_text(io.StringIO(lines), model.text().model_copy(update={"ragged": "drop"}), file)
+        table = parse_text(lines, model.text().model_copy(update={"ragged": "drop"}), file)
         if sampled:
             notes = (f"{len(table)} rows from {BLOCKS + 1} places of {size / 1e6:.0f} MB were looked at",)
         ragged = table.attrs["ragged"]
