@@ -33,7 +33,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth_motion
 from shipid.errors import DataError, is_utf_8, suggest_name
-from shipid.logs.cells import log_column, of_ais, of_minutes, of_parts, of_quaternion, parse_numbers
+from shipid.logs.cells import CODES, decode_numbers, log_column, parse_numbers
 from shipid.logs.channels import (
     Channel,
     close_gaps,
@@ -408,15 +408,8 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
         sides = side_letters(name) if column.unit == "deg" and isinstance(column.source, str) else ""
         place, units = f"columns.{name}.from", (column.unit, *(["%"] if "factor" in column.model_fields_set else []))
         parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
-        numbers = parts[0]
-        if column.unit == "ddmm":
-            numbers = of_minutes(numbers, table, other, f"columns.{name}.unit")
-        if column.unit == "ais":
-            numbers = of_ais(numbers, table, other, f"columns.{name}.unit")
-        if column.unit == "quaternion":
-            numbers = of_quaternion(parts, source_columns(column.source), table, other, f"columns.{name}.from")
-        elif len(parts) > 1:
-            numbers = of_parts(parts, source_columns(column.source), table, other, f"columns.{name}.from")
+        names, coded = source_columns(column.source), column.unit in CODES and (column.unit != "deg" or len(parts) > 1)
+        numbers = decode_numbers(parts, names, column.unit, table, other, place) if coded else parts[0]
         size = to_si(column.unit, name)
         factor = column.sign * column.factor * size
         values = numbers * factor if factor != 1.0 else numbers

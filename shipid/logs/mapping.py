@@ -98,6 +98,8 @@ _SIDED = re.compile(
 )
 """An angle to one side of a ship as text: side, degrees, side."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
+Faults = Iterator[tuple[object, str, str]]
+"""Whether something is wrong, the dotted path of it, and what it is."""
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
     "zigzag",
@@ -290,10 +292,10 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
         }
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
     clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
-    _check_mapped_columns(mapping, file)
-    _check_missing(mapping, file)
-    _check_instants(mapping, file)
-    _check_segments(mapping, file)
+    for check in (_check_mapped_columns, _check_missing, _check_instants, _check_segments):
+        for wrong, path, message in check(mapping, file):
+            if wrong:
+                raise DocumentError(message, file=file, path=path)
     repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
     for index, repair in enumerate(mapping.repair):
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
@@ -494,7 +496,7 @@ def _parse_repairs(raw: Any, file: Path) -> Iterator[Repair]:
         yield document.parse_model(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
 
 
-def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
+def _check_mapped_columns(mapping: Mapping, file: Path) -> Faults:
     columns = mapping.columns
     mapped = (
         *required_columns().keys() - {"t"},
@@ -508,71 +510,63 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
             hint = f"or <component>.<signal> with a signal of {signals}"
             raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
         _unit_factor(column.unit, unit, file, f"{path}.unit")
-        if column.unit == "ddmm" and name not in ("latitude", "longitude"):
-            raise DocumentError(
-                "only latitude and longitude are in degrees and minutes: write deg or rad",
-                file=file,
-                path=f"{path}.unit",
-            )
-        if column.unit == "ais" and name != "r":
-            raise DocumentError(
-                "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min",
-                file=file,
-                path=f"{path}.unit",
-            )
+        yield (
+            column.unit == "ddmm" and name not in ("latitude", "longitude"),
+            f"{path}.unit",
+            "only latitude and longitude are in degrees and minutes: write deg or rad",
+        )
+        yield (
+            column.unit == "ais" and name != "r",
+            f"{path}.unit",
+            "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min",
+        )
         four = not isinstance(column.source, str) and len(column.source) == 4
-        if four != (column.unit == "quaternion") or (four and name != "psi"):
-            raise DocumentError(
-                "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi",
-                file=file,
-                path=f"{path}.unit",
-            )
-        if not (four or isinstance(column.source, str)) and (
-            name not in ("latitude", "longitude") or column.unit != "deg"
-        ):
-            raise DocumentError(
-                "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column",
-                file=file,
-                path=f"{path}.from",
-            )
-        if (column.direction is None) == (name == "beta_w"):
-            raise DocumentError(
-                "must be 'towards' or 'from' for beta_w, and belongs to no other column",
-                file=file,
-                path=f"{path}.direction",
-            )
-        if column.wrap and unit != "rad":
-            raise DocumentError("only a column in rad or deg can wrap: remove wrap", file=file, path=f"{path}.wrap")
-        if column.relative and name != "beta_w":
-            raise DocumentError(
-                "only beta_w can be relative to the bow: remove relative", file=file, path=f"{path}.relative"
-            )
+        yield (
+            four != (column.unit == "quaternion") or (four and name != "psi"),
+            f"{path}.unit",
+            "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi",
+        )
+        yield (
+            (
+                not (four or isinstance(column.source, str))
+                and (name not in ("latitude", "longitude") or column.unit != "deg")
+            ),
+            f"{path}.from",
+            "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column",
+        )
+        yield (
+            (column.direction is None) == (name == "beta_w"),
+            f"{path}.direction",
+            "must be 'towards' or 'from' for beta_w, and belongs to no other column",
+        )
+        yield column.wrap and unit != "rad", f"{path}.wrap", "only a column in rad or deg can wrap: remove wrap"
+        yield (
+            column.relative and name != "beta_w",
+            f"{path}.relative",
+            "only beta_w can be relative to the bow: remove relative",
+        )
     for name in sorted(column for column in columns.keys() - {"u", "v"} if columns[column].frame == "earth"):
         raise DocumentError("only u and v can be earth-fixed: remove frame", file=file, path=f"columns.{name}.frame")
-    if "u" in columns and "v" in columns and columns["u"].frame != columns["v"].frame:
-        raise DocumentError(
-            "u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame"
-        )
-    if ("V_w" in columns) != ("beta_w" in columns):
-        raise DocumentError("wind needs both V_w and beta_w", file=file, path="columns")
+    yield (
+        "u" in columns and "v" in columns and columns["u"].frame != columns["v"].frame,
+        "columns.v.frame",
+        "u and v must be in one frame, both 'body' or both 'earth'",
+    )
+    yield ("V_w" in columns) != ("beta_w" in columns), "columns", "wind needs both V_w and beta_w"
 
 
-def _check_missing(mapping: Mapping, file: Path) -> None:
-    """Raise DocumentError unless every required column is mapped, converted from another, or estimated."""
+def _check_missing(mapping: Mapping, file: Path) -> Faults:
+    """Yield the faults of required columns that are not mapped, converted from another, or estimated."""
     columns = mapping.columns
     for name, other in REPLACED.items():
-        if name in columns and other in columns:
-            raise DocumentError(
-                f"{other} is converted to {name}, so both cannot be mapped: remove one of them",
-                file=file,
-                path=f"columns.{name}",
-            )
+        yield (
+            name in columns and other in columns,
+            f"columns.{name}",
+            f"{other} is converted to {name}, so both cannot be mapped: remove one of them",
+        )
     for pair in (("latitude", "longitude"), ("speed", "course")):
         missing = set(pair) - columns.keys()
-        if len(missing) == 1:
-            raise DocumentError(
-                f"missing: {' and '.join(pair)} belong together", file=file, path=f"columns.{missing.pop()}"
-            )
+        yield len(missing) == 1, f"columns.{next(iter(missing), '')}", f"missing: {' and '.join(pair)} belong together"
     for name in sorted(required_columns().keys() - {"t"} - columns.keys()):
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue
@@ -582,117 +576,114 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
             file=file,
             path=f"columns.{name}",
         )
-    if mapping.origin is not None and "latitude" not in columns:
-        raise DocumentError(
-            "is used with latitude and longitude only, and they are not mapped: remove it", file=file, path="origin"
-        )
-    if mapping.source.runs is not None and "latitude" in columns and mapping.origin is None:
-        raise DocumentError("missing: one origin for the files of all runs", file=file, path="origin")
+    yield (
+        mapping.origin is not None and "latitude" not in columns,
+        "origin",
+        "is used with latitude and longitude only, and they are not mapped: remove it",
+    )
+    yield (
+        mapping.source.runs is not None and "latitude" in columns and mapping.origin is None,
+        "origin",
+        "missing: one origin for the files of all runs",
+    )
     lacking = [name for name in ESTIMATED if name not in columns and REPLACED.get(name) not in columns]
-    if mapping.estimate is not None and not lacking:
-        raise DocumentError(
-            "u, v and r are all logged, so there is nothing to estimate: remove [estimate]", file=file, path="estimate"
-        )
-    if "u" in columns and columns["u"].frame == "earth" and "v" not in columns:
-        raise DocumentError("an earth-fixed u cannot be turned without v: map v too", file=file, path="columns.u.frame")
+    yield (
+        mapping.estimate is not None and not lacking,
+        "estimate",
+        "u, v and r are all logged, so there is nothing to estimate: remove [estimate]",
+    )
+    yield (
+        "u" in columns and columns["u"].frame == "earth" and "v" not in columns,
+        "columns.u.frame",
+        "an earth-fixed u cannot be turned without v: map v too",
+    )
     for index, repair in enumerate(mapping.repair):
         moves = isinstance(repair, LeverArm) and repair.moves != "position" and not {"u", "v"} <= set(lacking)
-        if moves and "r" in lacking:
-            raise DocumentError(
-                'velocities are moved by r, which is estimated afterwards: write moves = "position"',
-                file=file,
-                path=f"repair.{index}.moves",
-            )
+        yield (
+            moves and "r" in lacking,
+            f"repair.{index}.moves",
+            'velocities are moved by r, which is estimated afterwards: write moves = "position"',
+        )
 
 
-def _check_instants(mapping: Mapping, file: Path) -> None:
-    """Raise DocumentError unless columns with other instants can be interpolated at those of the dataset."""
+def _check_instants(mapping: Mapping, file: Path) -> Faults:
+    """Yield the faults of columns with other instants that cannot be interpolated at those of the dataset."""
     for name, column in mapping.columns.items():
         path = f"columns.{name}"
-        if column.file is not None and column.file not in mapping.file:
-            raise DocumentError(
-                f"no [file.{column.file}]: {suggest_name(column.file, mapping.file)}", file=file, path=f"{path}.file"
-            )
-        if column.interpolation == "angle" and (INPUTS.get(name) or unit_of_column(name)) != "rad":
-            raise DocumentError(
-                "only a column in rad or deg can be interpolated as an angle: use linear or previous",
-                file=file,
-                path=f"{path}.interpolation",
-            )
-        if column.interpolation is not None and not mapping.resamples:
-            raise DocumentError(
-                "nothing is interpolated at other instants: set [clock] step, a latency or a file",
-                file=file,
-                path=f"{path}.interpolation",
-            )
+        yield (
+            column.file is not None and column.file not in mapping.file,
+            f"{path}.file",
+            f"no [file.{column.file}]: {suggest_name(column.file or '', mapping.file)}",
+        )
+        yield (
+            column.interpolation == "angle" and (INPUTS.get(name) or unit_of_column(name)) != "rad",
+            f"{path}.interpolation",
+            "only a column in rad or deg can be interpolated as an angle: use linear or previous",
+        )
+        yield (
+            column.interpolation is not None and not mapping.resamples,
+            f"{path}.interpolation",
+            "nothing is interpolated at other instants: set [clock] step, a latency or a file",
+        )
     for name, entry in mapping.file.items():
         _unit_factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
     clocks: dict[str, Clock | FileClock] = {"clock": mapping.clock}
     clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
     for path, clock in clocks.items():
-        if clock.date is not None and clock.unit != "date":
-            raise DocumentError(
-                f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'",
-                file=file,
-                path=f"{path}.date",
-            )
-        if clock.unit in RESTS and len(source_columns(clock.source)) != 2:
-            raise DocumentError(
-                f"{clock.unit!r} is of two columns: write from = [seconds, the rest of them]",
-                file=file,
-                path=f"{path}.from",
-            )
-        if not isinstance(clock.source, str) and clock.unit not in ("date", *RESTS):
-            raise DocumentError(
-                "hour, minute and second in several columns are a time of day: write unit = 'date'",
-                file=file,
-                path=f"{path}.unit",
-            )
-    if mapping.resamples and mapping.clock.max_gap is None:
-        raise DocumentError(
-            "missing: columns are interpolated at other instants, so set the longest gap",
-            file=file,
-            path="clock.max_gap",
+        yield (
+            clock.date is not None and clock.unit != "date",
+            f"{path}.date",
+            f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'",
         )
-    if mapping.source.runs is not None and mapping.file:
-        raise DocumentError(
-            "source.runs reads one run from each file, [file.*] several files for one run: remove one of them",
-            file=file,
-            path="source.runs",
+        yield (
+            clock.unit in RESTS and len(source_columns(clock.source)) != 2,
+            f"{path}.from",
+            f"{clock.unit!r} is of two columns: write from = [seconds, the rest of them]",
         )
-    if mapping.source.runs is not None and mapping.segment:
-        raise DocumentError(
-            "source.runs reads one run from each file: remove the segments, or remove source.runs",
-            file=file,
-            path="segment",
+        yield (
+            not isinstance(clock.source, str) and clock.unit not in ("date", *RESTS),
+            f"{path}.unit",
+            "hour, minute and second in several columns are a time of day: write unit = 'date'",
         )
-    if mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None:
-        raise DocumentError(
-            "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]",
-            file=file,
-            path="parts",
-        )
-    if mapping.parts is not None and mapping.segment:
-        raise DocumentError(
-            "both [parts] and segments say where runs begin: remove one of them", file=file, path="parts"
-        )
+    yield (
+        mapping.resamples and mapping.clock.max_gap is None,
+        "clock.max_gap",
+        "missing: columns are interpolated at other instants, so set the longest gap",
+    )
+    yield (
+        mapping.source.runs is not None and mapping.file,
+        "source.runs",
+        "source.runs reads one run from each file, [file.*] several files for one run: remove one of them",
+    )
+    yield (
+        mapping.source.runs is not None and mapping.segment,
+        "segment",
+        "source.runs reads one run from each file: remove the segments, or remove source.runs",
+    )
+    yield (
+        mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None,
+        "parts",
+        "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]",
+    )
+    yield (
+        mapping.parts is not None and mapping.segment,
+        "parts",
+        "both [parts] and segments say where runs begin: remove one of them",
+    )
     for index, repair in enumerate(mapping.repair):
-        if isinstance(repair, WrapInterpolation) and mapping.resamples:
-            raise DocumentError(
-                "cannot see false samples after resampling: import without step, file and latency",
-                file=file,
-                path=f"repair.{index}.kind",
-            )
+        yield (
+            isinstance(repair, WrapInterpolation) and mapping.resamples,
+            f"repair.{index}.kind",
+            "cannot see false samples after resampling: import without step, file and latency",
+        )
 
 
-def _check_segments(mapping: Mapping, file: Path) -> None:
+def _check_segments(mapping: Mapping, _: Path) -> Faults:
     seen: set[str] = set()
     for index, segment in enumerate(mapping.segment):
         path = f"segment.{index}"
-        if segment.run in seen:
-            raise DocumentError(f"a run {segment.run!r} exists: add ' (2)'", file=file, path=f"{path}.run")
-        if not segment.start < segment.end:
-            raise DocumentError(f"start {segment.start:g} must lie before end {segment.end:g}", file=file, path=path)
+        yield segment.run in seen, f"{path}.run", f"a run {segment.run!r} exists: add ' (2)'"
+        yield not segment.start < segment.end, path, f"start {segment.start:g} must lie before end {segment.end:g}"
         seen.add(segment.run)
 
 

@@ -291,7 +291,7 @@ def test_positions_as_text(large: bool, tmp_path: Path, monkeypatch: pytest.Monk
         ),
         ({"month": 13}, 4, "'2023 13 31 23 59 59.5' is no date or time of day"),
         ({"s": None}, 4, "no time here: remove the row"),
-        ({"lon min": 60.5}, 4, "'lon min' is 60.5 in row 4, 60 or more: are these minutes or seconds"),
+        ({"lon min": 60.5}, 4, "'lon min': 60.5 in row 4 is 60 or more: are these minutes or seconds"),
     ],
 )
 def test_parts_that_cannot_be_are_named(change: dict[str, float], row: int, said: str, tmp_path: Path) -> None:
