@@ -116,13 +116,9 @@ def without_repeats(log: pd.DataFrame, clock: Clock, form: Format, file: Path) -
 
 def rows_repeated(table: pd.DataFrame) -> NDArray[np.bool_]:
     """Whether each row (N,) has the values of the row before in all columns."""
-    same = np.ones(len(table), dtype=bool)
+    before = table.shift()
+    same = (table.eq(before) | (table.isna() & before.isna())).fillna(False).all(axis=1).to_numpy(dtype=bool, copy=True)
     same[:1] = False
-    for index in range(table.shape[1]):
-        if not same.any():  # most often the first column is a time
-            break
-        column = table.iloc[:, index]
-        same &= (column.eq(column.shift()) | (column.isna() & column.shift().isna())).to_numpy(dtype=bool)
     return same
 
 
