@@ -15,7 +15,7 @@ import time
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -212,11 +212,14 @@ def write_table(file: Path, frame: DataFrame) -> None:
                 frame.to_parquet(stream, index=False)
 
 
-def read_arrow(source: Path | BinaryIO) -> Table:
-    """Read a Parquet file in this thread alone: PyArrow would wait without end where no other may be started."""
+def read_arrow(source: Path | BinaryIO, columns: Sequence[str] | None = None) -> Table:
+    """Read a Parquet file, or those of its columns that it has, in this thread alone.
+
+    PyArrow would wait without end where no other may be started.
+    """
     import pyarrow.parquet
 
-    return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
+    return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(columns, use_threads=False)
 
 
 def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:

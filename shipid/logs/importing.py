@@ -391,7 +391,10 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
         other = file.parent / entry.path
-        table = read_log_table(other, entry.format, entry.clock.sources[0])
+        needed = [
+            one for column in mapping.columns.values() if column.file == name for one in source_columns(column.source)
+        ]
+        table = read_log_table(other, entry.format, entry.clock.sources[0], [*entry.clock.sources, *needed])
         times = read_clock(table, entry.clock, entry.format, other, f"file.{name}.clock")
         files[name] = (table, times, entry.format, other)
         records += _skipped_line_records(table)

@@ -120,7 +120,7 @@ def refuse_power_cut(content: bytes, file: Path) -> None:
         raise DataError("holds NUL bytes, as after a power cut: remove them", file=file, path=f"line {damaged[0]}")
 
 
-def _read_text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
+def _read_text(file: Path, form: TextFormat, columns: Sequence[str], *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
@@ -133,7 +133,8 @@ def _read_text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
         message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         raise DataError(message, file=file, path="format.encoding")
     try:
-        return parse_text(io.TextIOWrapper(io.BytesIO(content), encoding=form.encoding, newline=""), form, file)
+        text = io.TextIOWrapper(io.BytesIO(content), encoding=form.encoding, newline="")
+        return parse_text(text, form, file, columns if len(columns) > 1 else ())
     except UnicodeDecodeError as error:
         message = (
             f"not {form.encoding} text (byte {error.start} of a block): set the encoding it was saved in, often cp1252"
@@ -141,8 +142,10 @@ def _read_text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
         raise DataError(message, file=file, path="format.encoding") from None
 
 
-def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path) -> pd.DataFrame:
+def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
     """Read text as a table of text; `file` is the log that errors name. Lines without any value are left out.
+
+    columns : those that are needed; all where one of them is not there, which an error has to say.
 
     A line of another length than the header is an error, or counted in `attrs["ragged"]` if `form.ragged` says so.
     """
@@ -153,6 +156,8 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path) -> pd.
     names = _column_names([row for _, row in head], form, file)
     width = max((place + 1 for place, name in enumerate(names) if name), default=1)
     said = names if form.header and form.names is None else None
+    places = [place for place in range(width) if names[place] in columns] if {*columns} <= {*names} else []
+    places = places or [*range(width)]
     blocks: list[pd.DataFrame] = []
     again: list[int] = []
     ragged: dict[int, int] = {}  # line -> its cells
@@ -169,11 +174,11 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path) -> pd.
             ):
                 again.append(line)
             else:
-                kept.append(row[:width])
-        blocks.append(pd.DataFrame(dict(enumerate(zip(*kept, strict=True))), columns=range(width), dtype="str"))
-    table = pd.concat(blocks, ignore_index=True) if blocks else pd.DataFrame(columns=range(width), dtype="str")
+                kept.append([row[place] for place in places])
+        blocks.append(pd.DataFrame(dict(enumerate(zip(*kept, strict=True))), columns=range(len(places)), dtype="str"))
+    table = pd.concat(blocks, ignore_index=True) if blocks else pd.DataFrame(columns=range(len(places)), dtype="str")
     _refuse_wrong_lines(again, ragged, len(table), width, form, file)
-    table.columns = pd.Index(names[:width])
+    table.columns = pd.Index([names[place] for place in places])
     table.attrs["ragged"] = sorted([*again, *ragged])
     return table
 
@@ -366,10 +371,12 @@ def _read_sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:
     return parse_text(sheet_text(file, name), form.text(), file)
 
 
-def _read_parquet(file: Path, *_: object) -> pd.DataFrame:
+def _read_parquet(file: Path, _: object, columns: Sequence[str], *__: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
-        stored = read_arrow(file)
+        stored = read_arrow(file, columns) if len(columns) > 1 else None
+        if stored is None or not {*columns} <= {*stored.column_names}:  # an error says which there are
+            stored = read_arrow(file)
         nested = {field.name: field.type for field in stored.schema if pyarrow.types.is_nested(field.type)}
         plain = [place for place, field in enumerate(stored.schema) if field.name not in nested]
         # an index is a column

@@ -167,3 +167,12 @@ def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: 
     assert [*table.attrs["other"]] == ["cells", "box"]
     with pytest.raises(DataError, match=r"'box' is nested \(struct<a: int64>\): write each of its values as a column"):
         log_column(table, "box", tmp_path / "log.parquet", "columns.psi.from")
+
+
+@pytest.mark.parametrize("kind", ["text", "parquet"])
+def test_columns_that_are_not_asked_for_are_not_made(kind: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """Of a name that is not there all are, for the line that says so."""
+    file, form = tmp_path / "log", TextFormat() if kind == "text" else ParquetFormat(kind="parquet")
+    log.to_csv(file, index=False) if kind == "text" else log.to_parquet(file)
+    assert {*read_log_table(file, form, "time", ("u", "N"))} == {"time", "N", "u"}
+    assert list(read_log_table(file, form, "time", ("u", "speed"))) == NAMES
