@@ -292,33 +292,10 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
         }
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
     clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
-    for check in (_check_mapped_columns, _check_missing, _check_instants, _check_segments):
+    for check in (_check_mapped_columns, _check_missing, _check_instants, _check_segments, _check_repairs):
         for wrong, path, message in check(mapping, file):
             if wrong:
                 raise DocumentError(message, file=file, path=path)
-    repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
-    for index, repair in enumerate(mapping.repair):
-        for column in repair.columns if isinstance(repair, ColumnRepair) else ():
-            if column not in repairable:
-                raise DocumentError(
-                    f"no column {column!r} to repair: {suggest_name(column, repairable)}",
-                    file=file,
-                    path=f"repair.{index}.columns",
-                )
-            if isinstance(repair, ColumnRepair) and repair.of_inputs and column not in mapping.columns:
-                raise DocumentError(
-                    f"{column!r} is made of columns that this repair mends: write two repairs",
-                    file=file,
-                    path=f"repair.{index}.columns",
-                )
-            if isinstance(repair, WrapInterpolation) and not (
-                column in mapping.columns and mapping.columns[column].wrap
-            ):
-                raise DocumentError(
-                    f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair",
-                    file=file,
-                    path=f"repair.{index}.columns",
-                )
     converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]
     return mapping.model_copy(update={"repair": tuple(converted)})
 
@@ -555,7 +532,7 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> Faults:
     yield ("V_w" in columns) != ("beta_w" in columns), "columns", "wind needs both V_w and beta_w"
 
 
-def _check_missing(mapping: Mapping, file: Path) -> Faults:
+def _check_missing(mapping: Mapping, _: Path) -> Faults:
     """Yield the faults of required columns that are not mapped, converted from another, or estimated."""
     columns = mapping.columns
     for name, other in REPLACED.items():
@@ -571,11 +548,7 @@ def _check_missing(mapping: Mapping, file: Path) -> Faults:
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue
         remedy = ", or [estimate]" if name in ESTIMATED else ""
-        raise DocumentError(
-            f"missing: a dataset needs {', '.join(list(required_columns())[1:])}{remedy}",
-            file=file,
-            path=f"columns.{name}",
-        )
+        yield True, f"columns.{name}", f"missing: a dataset needs {', '.join(list(required_columns())[1:])}{remedy}"
     yield (
         mapping.origin is not None and "latitude" not in columns,
         "origin",
@@ -685,6 +658,26 @@ def _check_segments(mapping: Mapping, _: Path) -> Faults:
         yield segment.run in seen, f"{path}.run", f"a run {segment.run!r} exists: add ' (2)'"
         yield not segment.start < segment.end, path, f"start {segment.start:g} must lie before end {segment.end:g}"
         seen.add(segment.run)
+
+
+def _check_repairs(mapping: Mapping, _: Path) -> Faults:
+    repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
+    columns = (
+        (k, one, name) for k, one in enumerate(mapping.repair) if isinstance(one, ColumnRepair) for name in one.columns
+    )
+    for index, repair, name in columns:
+        path = f"repair.{index}.columns"
+        yield name not in repairable, path, f"no column {name!r} to repair: {suggest_name(name, repairable)}"
+        yield (
+            repair.of_inputs and name not in mapping.columns,
+            path,
+            f"{name!r} is made of columns that this repair mends: write two repairs",
+        )
+        yield (
+            isinstance(repair, WrapInterpolation) and not (name in mapping.columns and mapping.columns[name].wrap),
+            path,
+            f"{name!r} does not wrap: write wrap = true in its column, or take it off this repair",
+        )
 
 
 def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
