@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import operator
 import re
 import stat
 import threading
@@ -158,6 +159,7 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
     said = names if form.header and form.names is None else None
     places = [place for place in range(width) if names[place] in columns] if {*columns} <= {*names} else []
     places = places or [*range(width)]
+    pick = operator.itemgetter(*places) if len(places) > 1 else operator.itemgetter(slice(places[0], places[0] + 1))
     blocks: list[pd.DataFrame] = []
     again: list[int] = []
     ragged: dict[int, int] = {}  # line -> its cells
@@ -174,7 +176,7 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
             ):
                 again.append(line)
             else:
-                kept.append([row[place] for place in places])
+                kept.append(pick(row))
         blocks.append(pd.DataFrame(dict(enumerate(zip(*kept, strict=True))), columns=range(len(places)), dtype="str"))
     table = pd.concat(blocks, ignore_index=True) if blocks else pd.DataFrame(columns=range(len(places)), dtype="str")
     _refuse_wrong_lines(again, ragged, len(table), width, form, file)
@@ -185,25 +187,23 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
 
 def _filled_rows(text: io.TextIOBase, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield number of the line, from 1, and cells of each row that has any. DataError where quotes never close."""
-    blanks, numbers = form.separator == "whitespace", [0]  # of the lines of a row
-
-    def lines() -> Iterator[str]:
-        for number, line in enumerate(text, start=1):
-            comment = not numbers and form.comment is not None and line.startswith(form.comment)
-            if number > form.skip_rows and not comment:
-                numbers.append(number)
-                yield re.sub(r"[ \t]+", " ", line.strip(" \t\r\n")) if blanks else line
-
-    numbers.clear()
+    blanks, before = form.separator == "whitespace", form.skip_rows
+    lines: Iterator[str] = itertools.islice(text, form.skip_rows, None)
+    if form.comment is not None:
+        mark = form.comment
+        lines = ("" if line.startswith(mark) else line for line in lines)
+    if blanks:
+        lines = (line.replace("\t", " ").strip() for line in lines)
+    reader = csv.reader(lines, delimiter=" " if blanks else form.separator, skipinitialspace=blanks)
     try:
-        for row in csv.reader(lines(), delimiter=" " if blanks else form.separator):
+        for row in reader:
             if any(map(str.strip, row)):
                 check_width(len(row), file)
-                yield numbers[0], row
-            numbers.clear()
+                yield before + 1, row
+            before = form.skip_rows + reader.line_num
     except csv.Error as error:
         message = f"a cell without an end ({error}): is its closing quote lacking?"
-        raise DataError(message, file=file, path=f"line {numbers[0]}") from None
+        raise DataError(message, file=file, path=f"line {before + 1}") from None
 
 
 def _no_rows_error(form: TextFormat, file: Path) -> DataError:

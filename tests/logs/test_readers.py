@@ -176,3 +176,5 @@ def test_columns_that_are_not_asked_for_are_not_made(kind: str, log: pd.DataFram
     log.to_csv(file, index=False) if kind == "text" else log.to_parquet(file)
     assert {*read_log_table(file, form, "time", ("u", "N"))} == {"time", "N", "u"}
     assert list(read_log_table(file, form, "time", ("u", "speed"))) == NAMES
+    alone = read_log_table(file, form, "u", ("u",))
+    np.testing.assert_allclose(pd.to_numeric(alone["u"]), log["u"])
