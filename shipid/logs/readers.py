@@ -43,7 +43,7 @@ from shipid.logs.ulog import is_ulog, read_ulog
 from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_with_values
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
-LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
+LARGE = 4_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
 ROWS_AT_ONCE = 50_000  # of a text, whose cells are Python's until they are a column
 Progress = Callable[[float], None]
 
@@ -253,10 +253,16 @@ def _large_text(
     file: Path, form: TextFormat, wanted: set[str], progress: Progress | None, size: int
 ) -> pd.DataFrame | None:
     """Read only the wanted columns of a text log, block by block, as numbers; None where that cannot be done."""
-    if form.separator == "whitespace" or form.comment is not None or form.ragged == "drop":
+    if form.comment is not None or form.ragged == "drop":
         return None
+    source: Path | io.BytesIO = file
     with file.open("rb") as stream:
         head = stream.read(1_000_000)
+    if form.separator == "whitespace":
+        if form.encoding.startswith(("utf-16", "utf-32")):
+            return None
+        content = b"\n".join(b"\t".join(line.split()) for line in file.read_bytes().splitlines())
+        source, form, head = io.BytesIO(content), form.model_copy(update={"separator": "\t"}), content[:1_000_000]
     if has_nul(head, form):
         return None
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
@@ -281,7 +287,7 @@ def _large_text(
     }
     try:
         cells = text.split("\n", form.skip_rows + 1)[form.skip_rows].count(form.separator) + 1  # some without a name
-        reader = _read_blocks(file, form, max(len(names), cells), plain)
+        reader = _read_blocks(source, form, max(len(names), cells), plain)
         about = size * max(1, len(first)) / len(text)  # rows
         columns = _columns_of_blocks(reader, plain, about, progress)
     except (pyarrow.ArrowException, UnicodeError, ValueError):
@@ -295,14 +301,16 @@ def _large_text(
     return None if blank.any() else table  # whether such a line is empty, only all its cells tell
 
 
-def _read_blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) -> Iterator[pyarrow.RecordBatch]:
+def _read_blocks(
+    source: Path | io.BytesIO, form: TextFormat, width: int, plain: dict[int, bool]
+) -> Iterator[pyarrow.RecordBatch]:
     """The columns of a text log at some places, block by block; `plain` says which of them are numbers."""
     import pyarrow.csv as arrow
 
     pyarrow.set_io_thread_count(1)
     _start_threads(2)
     blocks: Iterator[pyarrow.RecordBatch] = arrow.open_csv(
-        file,
+        source,
         arrow.ReadOptions(
             column_names=[str(i) for i in range(width)],
             skip_rows=form.skip_rows + int(form.header and form.names is None),

@@ -57,6 +57,7 @@ LARGE_TEXTS: dict[str, tuple[TextFormat, str]] = {
     "decimal commas": (TextFormat(separator=";", decimal=","), "a;b;c\n0,5;1;x\n1,5;;y\n2,5;3;z\n"),
     "no header": (TextFormat(names=("a", "b", "c")), "0.5,1,x\n1.5,,y\n2.5,3,z\n"),
     "lines above": (TextFormat(skip_rows=2), "ship\nday\na,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
+    "blanks": (TextFormat(separator="whitespace"), "a b  c\n 0.5 1\tx\n1.5 nan  y \n2.5 3 z\n"),
     "utf-16": (TextFormat(encoding="utf-16"), "a,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
 }
 
