@@ -115,7 +115,10 @@ def parse_toml(text: str, file: Path | str | None = None) -> Document:
     except (RecursionError, ValueError) as error:
         line = re.search(r"at line (\d+)", str(error))
         lines = text.split("\n")  # `splitlines` also cuts at separators of Unicode, inside a comment
-        shown = f": {lines[int(line[1]) - 1].strip()!r}" if line else ""
+        own = (
+            file is None or Path(file).suffix == ".toml"
+        )  # what another document names may be any file, of secrets, too
+        shown = f": {lines[int(line[1]) - 1].strip()!r}" if line and own else ""
         raise DocumentError(f"not valid TOML: {error}{shown}", file=file) from None
 
 

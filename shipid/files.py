@@ -15,7 +15,7 @@ import time
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -34,6 +34,7 @@ TABLES = (".parquet", ".csv")
 # The header of an array is a piece of Python: the last two.
 _NOT_WHOLE = (zipfile.BadZipFile, zlib.error, EOFError, tokenize.TokenError, SyntaxError)
 _SWEPT: set[Path] = set()  # folders that this process has looked through: one of 10,000 files takes milliseconds
+_KNOWN: set[Path] = set()  # folders in which this process has written
 
 
 @contextmanager
@@ -67,11 +68,14 @@ def replace_whole(target: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, synced to disk."""
+    """Make a folder and those above it, synced to disk; OSError for one that was there, and has been moved away."""
     if not folder.is_dir():
+        if folder in _KNOWN:
+            raise FileNotFoundError(errno.ENOENT, "the folder has gone: it was moved or removed", str(folder))
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
         sync_to_disk(folder.parent)
+    _KNOWN.add(folder)
 
 
 def sync_to_disk(place: Path) -> None:
@@ -208,11 +212,14 @@ def write_table(file: Path, frame: DataFrame) -> None:
                 frame.to_parquet(stream, index=False)
 
 
-def read_arrow(source: Path | BinaryIO) -> Table:
-    """Read a Parquet file in this thread alone: PyArrow would wait without end where no other may be started."""
+def read_arrow(source: Path | BinaryIO, columns: Sequence[str] | None = None) -> Table:
+    """Read a Parquet file, or those of its columns that it has, in this thread alone.
+
+    PyArrow would wait without end where no other may be started.
+    """
     import pyarrow.parquet
 
-    return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
+    return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(columns, use_threads=False)
 
 
 def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:

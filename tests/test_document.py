@@ -93,6 +93,10 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
         with pytest.raises(DocumentError, match=remedy) as caught:
             documents.read_document(file)
         assert caught.value.file == str(file)
+    (tmp_path / "secret").write_text("TOKEN=hunter2\n")
+    with pytest.raises(DocumentError) as caught:  # what another file names may be anything: nothing of it is shown
+        documents.read_document(tmp_path / "secret")
+    assert "hunter2" not in str(caught.value)
     for missing in (tmp_path / "gone.toml", tmp_path):
         with pytest.raises(DocumentError, match="cannot be read"):
             documents.read_document(missing)

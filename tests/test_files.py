@@ -224,3 +224,13 @@ def test_devices_and_pipes_are_neither_written_nor_waited_for(tmp_path: Path) ->
 )
 def test_a_path_in_a_command_can_be_typed_as_it_is(path: str, typed: str) -> None:
     assert files.quote_argument(Path(path)) == typed
+
+
+def test_nothing_is_written_again_where_a_folder_was_moved_away(tmp_path: Path) -> None:
+    """Before, an empty folder came back at the old place."""
+    files.write_json(tmp_path / "results" / "cells" / "a.json", {"a": 1})
+    (tmp_path / "results").rename(tmp_path / "moved")
+    for file in ("cells/b.json", "b.json", "new/b.json"):
+        with pytest.raises(OSError, match="the folder has gone"):
+            files.write_json(tmp_path / "results" / file, {"b": 1})
+    assert not (tmp_path / "results").exists()

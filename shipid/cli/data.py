@@ -43,7 +43,11 @@ def data_import(
         Path | None,
         typer.Option(help="draft a mapping of this log, folder of logs or glob in quotes, instead of importing it"),
     ] = None,
-    names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
+    topics: Annotated[Path | None, typer.Option(help="list the topics of this recording (ROS, PX4, ArduPilot)")] = None,
+    names: Annotated[
+        str,
+        typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any, or of the topics to read"),
+    ] = "",
     vessel: Annotated[
         str | None,
         typer.Option(help="with --guess: vessel whose names the commands take"),
@@ -58,6 +62,12 @@ def data_import(
     as_json: Json = False,
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
+    if topics is not None:
+        from shipid.logs.readers import list_topics
+
+        with open_answer(as_json) as answer:
+            answer.records("topics", list_topics(topics), formats={"rate": "{:.3g} Hz".format})
+        return
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,19 +31,35 @@ from shipid.logs.workbook import NOT_CALCULATED
 OFF_ONE = 0.05  # of the size of a quaternion from 1: more is no rounding
 
 
-def of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
-    """Degrees and minutes (N,) as degrees."""
-    degrees = degrees_and_minutes(numbers)
-    wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
-    _refuse_value(wrong, numbers, log, file, path, behind=" has 60 minutes or more: is the unit deg?")
-    return degrees
-
-
-def of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
-    """Rates of turn (N,) as messages of AIS have them, in deg/min."""
-    why = " is none of -128 to 127, as AIS has: is the unit deg/min?"
-    _refuse_value((numbers < -128) | (numbers > 127), numbers, log, file, path, behind=why)
-    return rate_of_ais(numbers)
+Parts = list[NDArray[np.float64]]
+CODES: dict[str, tuple[Callable[[Parts], Any], Callable[[Parts], Any], Callable[[Parts], Any], str]] = {
+    "ddmm": (
+        lambda parts: degrees_and_minutes(parts[0]),
+        lambda parts: np.abs(parts[0]) % 100.0 >= 60.0,
+        lambda parts: parts[0],
+        "60 minutes or more: is the unit deg?",
+    ),
+    "ais": (
+        lambda parts: rate_of_ais(parts[0]),
+        lambda parts: np.abs(parts[0] + 0.5) > 127.5,
+        lambda parts: parts[0],
+        "none of -128 to 127, as AIS has: is the unit deg/min?",
+    ),
+    "deg": (
+        degrees_in_parts,
+        lambda parts: np.max(np.abs(parts[1:]), axis=0) >= 60.0,
+        lambda parts: np.max(np.abs(parts[1:]), axis=0),
+        "60 or more: are these minutes or seconds?",
+    ),
+    "quaternion": (
+        quaternion_yaw,
+        lambda parts: (quaternion_size(parts) > 0.0) & (np.abs(quaternion_size(parts) - 1.0) > OFF_ONE),
+        lambda parts: np.round(quaternion_size(parts), 4),
+        "the size of what has to be a quaternion, of size 1: are these x, y, z, w?",
+    ),
+}
+"""Unit of numbers that are a code, or of several columns -> their values (N,), which are wrong, what is shown of these,
+and why."""
 
 
 def of_curve(
@@ -54,45 +70,22 @@ def of_curve(
     why = (
         f" is outside the curve, {ends[0]:g} to {ends[-1]:g}: give it another end, flat where the drive stays as it is"
     )
-    _refuse_value((numbers < ends[0]) | (numbers > ends[-1]), numbers, log, file, path, behind=why)
+    wrong = np.flatnonzero((numbers < ends[0]) | (numbers > ends[-1]))
+    if len(wrong):
+        raise DataError(f"{numbers[wrong[0]]:.10g} in {row_in_words(log, wrong[0])}{why}", file=file, path=path)
     return np.asarray(np.interp(numbers, ends, values), dtype=np.float64)
 
 
-def of_parts(
-    parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
+def decode_numbers(
+    parts: Parts, names: tuple[str, ...], unit: str, log: pd.DataFrame, file: Path, path: str
 ) -> NDArray[np.float64]:
-    """Degrees, minutes and seconds (N,), of columns of these names, as degrees."""
-    why = ", 60 or more: are these minutes or seconds?"
-    for name, part in zip(names[1:], parts[1:], strict=True):
-        _refuse_value(np.abs(part) >= 60.0, part, log, file, path, f"{name!r} is ", why)
-    return degrees_in_parts(parts)
-
-
-def of_quaternion(
-    parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
-) -> NDArray[np.float64]:
-    """Quaternions (4, N), of columns of these names, as yaw angles [rad]."""
-    size = quaternion_size(parts)
-    said, why = ", ".join(map(repr, names)), ", and a quaternion has 1: are these x, y, z, w?"
-    wrong = (size > 0) & (np.abs(size - 1.0) > OFF_ONE)
-    _refuse_value(wrong, size, log, file, path, f"{said} have the size ", why, digits=4)
-    return quaternion_yaw(parts)
-
-
-def _refuse_value(
-    wrong: NDArray[np.bool_],
-    values: NDArray[np.float64],
-    log: pd.DataFrame,
-    file: Path,
-    path: str,
-    before: str = "",
-    behind: str = "",
-    digits: int = 10,
-) -> None:
-    """Raise DataError where values (N,) are wrong: the first of them and its row, with words before and behind."""
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(f"{before}{values[row]:.{digits}g} in {row_in_words(log, row)}{behind}", file=file, path=path)
+    """Values (N,) of columns (N,) of these names in a unit of `CODES`; raises DataError at the first that is none."""
+    values, are_wrong, shown, why = CODES[unit]
+    wrong = np.flatnonzero(are_wrong(parts))
+    if len(wrong):
+        what = f"{', '.join(map(repr, names))}: {shown(parts)[wrong[0]]:.10g} in {row_in_words(log, wrong[0])} is {why}"
+        raise DataError(what, file=file, path=path)
+    return np.asarray(values(parts), dtype=np.float64)
 
 
 def row_in_words(log: pd.DataFrame, place: int) -> str:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from shipid.data.dataset import FIRST_DATED_TIME, Array
 
@@ -208,37 +207,25 @@ def _as_texts(cells: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Year, month and day, or year and day of the year (N,), as text; None where the log has neither."""
-    year, last = parts[0], 31 if len(parts) == 3 else 366
-    year = np.where((year >= 0) & (year < 100), year + np.where(year < 69, 2000, 1900), year)
-    limits = [(1900, 9999), *([(1, 12)] if len(parts) == 3 else []), (1, last)]
-    form = "{:.0f}-{:02.0f}-{:02.0f}" if len(parts) == 3 else "{:.0f}-{:03.0f}"
-    known = _all_whole([year, *parts[1:]], limits)
-    cells = zip(*(part.tolist() for part in (year, *parts[1:])), strict=True)
-    return pd.Series(
-        [form.format(*cell) if one else None for one, cell in zip(known, cells, strict=True)], dtype=object
-    )
+    """Year, month and day, or year and day of the year (N,), as text; nothing where these are no date."""
+    year, *rest = (pd.Series(part).where(part % 1 == 0).astype("Int64") for part in parts)
+    year = year + (1900 + 100 * (year < 69)).where(year < 100, 0)
+    texts = year.astype("string")
+    for part in rest:
+        texts = texts + "-" + part.astype("string")
+    moments = pd.to_datetime(texts, format="%Y-%m-%d" if len(rest) == 2 else "%Y-%j", errors="coerce")
+    return moments.dt.strftime("%Y-%m-%d").astype(object)
 
 
 def time_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Hour, minute and, if there is a third, second (N,), as text for `parse_dates`; None without an hour."""
-    hour, minute, *rest = parts
-    second = rest[0] if rest else np.zeros(len(hour))
-    known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])
-    micros = np.round(1e6 * (3600.0 * hour + 60.0 * minute + second)[known]).astype(np.int64)
-    micros = np.minimum(micros, int(1e6 * DAY) - 1)  # 24:00:00 is no time of day
-    texts = pd.Series([None] * len(hour), dtype=object)
-    whole = micros // 1_000_000
-    numbers = zip(whole // 3600, whole // 60 % 60, whole % 60, micros % 1_000_000, strict=True)
-    texts[known] = ["{:02d}:{:02d}:{:02d}.{:06d}".format(*one) for one in numbers]
-    return texts
-
-
-def _all_whole(parts: list[Array], limits: list[tuple[int, int]]) -> NDArray[np.bool_]:
-    """Whether all parts (N,) are whole numbers from the first to the second of their limits."""
-    pairs = zip(parts, limits, strict=True)
-    inside = [(part >= low) & (part <= high) & (part % 1 == 0) for part, (low, high) in pairs]
-    return np.asarray(np.all(inside, axis=0), dtype=np.bool_)
+    """Hour, minute and, if there is a third, second (N,), as text for `parse_dates`; nothing where they are no time."""
+    hour, minute, second = (*parts, np.zeros(len(parts[0])))[:3]
+    known = (hour % 1 == 0) & (minute % 1 == 0)
+    for part, most in ((hour, 24.0), (minute, 60.0), (second, 61.0)):  # with a leap second
+        known &= (part >= 0.0) & (part < most)
+    micros = np.where(known, np.round(1e6 * (3600.0 * hour + 60.0 * minute + second)), np.nan)
+    moments = pd.to_datetime(pd.Series(np.minimum(micros, 1e6 * DAY - 1.0)), unit="us")  # 24:00:00 is no time of day
+    return moments.dt.strftime("%H:%M:%S.%f").astype(object)
 
 
 def _since_1970(moments: pd.Series[Any]) -> Array:

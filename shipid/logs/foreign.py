@@ -59,22 +59,10 @@ FOREIGN = (
     Foreign(rb"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
     Foreign(rb"Rar!\x1a\x07", "a RAR archive", UNPACK),
     Foreign(rb".{257}ustar", "a tar archive", UNPACK),
-    Foreign(rb"#ROSBAG V", "a recording of ROS (.bag)", TOPICS),
-    Foreign(rb"\x89MCAP0\r\n", "a recording of ROS (.mcap)", TOPICS),
     Foreign(
         rb"SQLite format 3\0",
-        "a data base of SQLite (.db3, .sqlite)",
-        f"write its table as CSV; of a recording of ROS, {TOPICS}",
-    ),
-    Foreign(
-        rb"ULog\x01\x12\x35",
-        "a flight log of PX4 (.ulg)",
-        "convert it with ulog2csv, which writes a CSV file for each topic; [file.<name>] of a mapping joins them",
-    ),
-    Foreign(
-        rb"\xa3\x95",
-        "a flight log of ArduPilot (.bin)",
-        "convert it with mavlogdump.py --format csv, a CSV file for each type of message",
+        "a data base of SQLite (.sqlite)",
+        "write its table as CSV; a recording of ROS 2 ends in .db3",
     ),
     Foreign(rb"TDS[mh]", "a file of LabVIEW (.tdms)", "export its channels as CSV, or .mat"),
     Foreign(rb"MDF     ", "a measurement file of ASAM (.mdf, .mf4)", "export its channels as CSV, or .mat"),
@@ -103,6 +91,11 @@ FOREIGN = (
         rb"\s*\{.{0,2000}?\"pgn\"\s*:",
         "messages of NMEA 2000 as JSON",
         f"write a CSV with {FIELDS}, such as with pandas.read_json(lines=True), json_normalize and pivot_table",
+    ),
+    Foreign(
+        rb"!boat,utc,[^\r\n]*[\r\n]+!boat,\d",
+        "a log of Expedition with pairs of number and value",
+        f"export it as CSV with {FIELDS}",
     ),
     Foreign(
         rb"(?:#(?:group|datatype|default)\b.{0,3000}?)?,?[\w,]*,_value,_field\b",

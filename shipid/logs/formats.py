@@ -89,3 +89,9 @@ class NmeaFormat(Format):
     """NMEA 0183 sentences; `time` is of the last fix, or a number or ISO date before each sentence (`"line"`)."""
 
     time: Literal["fix", "line"] = "fix"
+
+
+class TopicsFormat(Format):
+    """A recording of topics or messages; `topics` are those that are read, by default all of the mapped columns."""
+
+    topics: tuple[str, ...] = ()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import logging
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as PlainMapping
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +28,12 @@ from shipid.data.dataset import (
     required_columns,
     sample_columns,
     stretches_of_runs,
+    unit_of_column,
     units_of_columns,
 )
 from shipid.data.kinematics import Noise, smooth_motion
 from shipid.errors import DataError, is_utf_8, suggest_name
-from shipid.logs.cells import log_column, of_ais, of_curve, of_minutes, of_parts, of_quaternion, parse_numbers
+from shipid.logs.cells import CODES, decode_numbers, log_column, of_curve, parse_numbers
 from shipid.logs.channels import (
     Channel,
     close_gaps,
@@ -58,6 +60,7 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import Progress, read_log_table, require_file
 from shipid.logs.repairs import (
     FLAGS,
+    INPUTS,
     REPAIRS,
     Break,
     Despike,
@@ -73,6 +76,9 @@ from shipid.physics.signals import is_command, is_output
 __all__ = ["file_digest", "import_log", "log_digest", "read_mapping", "run_files"]
 
 logger = logging.getLogger(__name__)
+_UNSAFE = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]|^\s*(?:[=@]|[+-](?!\d[\w .+-]*$))+")
+LIMITS = {"s": 1e12, "m": 1e8, "m/s": 200.0, "rad": 1e6, "rad/s": 100.0, "rev/s": 1e4, "N": 1e10, "N m": 1e12, "-": 1e4}
+"""SI unit of a column -> the largest number that a ship may have: far beyond any, so that a wrong unit may pass."""
 Begins = list[tuple[float, str]]
 
 
@@ -142,12 +148,14 @@ def import_log(
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
     if mapping.parts is not None:
+        pieces = [piece for run, part in each for piece in _split_runs(part, run)]
+        names = distinct_names(name for name, _ in pieces)
         frame = pd.concat(
-            _distinct_runs(piece for run, part in each for piece in _split_runs(part, run)), ignore_index=True
+            [_name_run(rows, name) for name, (_, rows) in zip(names, pieces, strict=True)], ignore_index=True
         )
     elif mapping.source.runs is None:
         unit, t = to_si(mapping.clock.unit, "t"), rows["t"]
-        whole = Segment(run=source.stem, start=t.iloc[0] / unit, end=t.iloc[-1] / unit)
+        whole = Segment(run=clean_name(source.stem), start=t.iloc[0] / unit, end=t.iloc[-1] / unit)
         frame, outside = _cut_into_runs(rows, mapping.segment or (whole,), unit, source)
         repairs += outside
     else:
@@ -168,7 +176,7 @@ def run_files(source: LogSource, log: Path) -> dict[str, Path]:
                 file=log,
                 path="source.runs",
             )
-        return {log.stem: log}
+        return {clean_name(log.stem): log}
     if not log.is_dir():
         fault = "is a file, and the mapping takes a folder of runs" if log.is_file() else "there is no such folder"
         raise DataError(f"{fault}: files {source.runs!r}", file=log, path="source.runs")
@@ -179,15 +187,24 @@ def run_files(source: LogSource, log: Path) -> dict[str, Path]:
     foreign = [file for file in files if not is_utf_8(str(file.relative_to(log)))]
     if foreign:
         raise DataError("its name is not UTF-8, and names the run: rename it", file=foreign[0])
-    return {run_name(file, log, source.runs): file for file in files}
+    names = distinct_names([run_name(file, log, source.runs) for file in files])
+    return dict(zip(names, files, strict=True))
 
 
 def run_name(file: Path, folder: Path, pattern: str) -> str:
-    """The name of the run in a file: the text that a single star matches, else its path without ending."""
+    """The name of the run in a file: the text that a single star matches, else its path without ending; clean."""
     if pattern.count("*") == 1 and "/" not in pattern:
         before, _, after = pattern.partition("*")
-        return file.name.removeprefix(before).removesuffix(after)
-    return file.relative_to(folder).with_suffix("").as_posix()
+        return clean_name(file.name.removeprefix(before).removesuffix(after))
+    return clean_name(file.relative_to(folder).with_suffix("").as_posix())
+
+
+def clean_name(name: str) -> str:
+    """A name of a run without characters that steer a terminal, and without a begin that makes it a formula in a sheet.
+
+    A number with its sign stays.
+    """
+    return _UNSAFE.sub("", name) or "run"
 
 
 def log_digest(mapping: Mapping, log: Path) -> str:
@@ -235,7 +252,7 @@ def _warn_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
     (clock,), form, head = mapping.clock.sources, mapping.format, ""
     if isinstance(form, TextFormat):
         with file.open(encoding=form.encoding, errors="replace") as stream:
-            head = "".join(islice(stream, form.skip_rows))
+            head = "".join(itertools.islice(stream, form.skip_rows))
     first = str(log_column(table, clock, file, "clock.from").iloc[0]).strip()
     if said := other_zone(head, clock, first):
         logger.warning("%s: clock.from: %s: if it is the time there, %s", file.name, said, ZONE_REMEDY)
@@ -289,7 +306,10 @@ def _run_texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_
 
 def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> ImportedLog:
     rows, first, read, begins = _mapped_columns(mapping, file, log)
-    _check_breaks(mapping, rows["t"].to_numpy(), off, file)
+    t, numbered = rows["t"].to_numpy(), None if mapping.resamples else rows.index
+    turns = [name for name, column in mapping.columns.items() if column.wrap or column.direction == "from"]
+    _check_limits(rows[["t", *turns]], t, numbered, file)  # unwrapped, any number is an angle
+    _check_breaks(mapping, t, off, file)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
     early = [repair for repair in mapping.repair if _comes_first(repair, fixed, {*mapping.columns})]
@@ -318,6 +338,7 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
     known = [name for name in (*required_columns(), *optional_columns()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]
     outputs = [str(name) for name in rows.columns if is_output(str(name))]
+    _check_limits(rows, t, numbered, file)
     order = (
         [*known, *commands, *outputs, "flags"]
         if mapping.resamples or "latitude" in mapping.columns
@@ -326,6 +347,22 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
     return ImportedLog(
         rows[order].reset_index(drop=True), first + records + gaps + more + estimated, read, origin, begins
     )
+
+
+def _check_limits(rows: pd.DataFrame, t: Array, numbered: pd.Index[int] | None, file: Path) -> None:
+    """Raise DataError for a value that no ship has; t (N,) [s] and `numbered` are times and places of its rows."""
+    for name in map(str, rows.columns.drop("flags", errors="ignore")):
+        unit, values = str(INPUTS.get(name) or unit_of_column(name)), rows[name].to_numpy()
+        if not (np.fmax.reduce(values) > LIMITS[unit] or np.fmin.reduce(values) < -LIMITS[unit]):  # past NaN, fast
+            continue
+        place = int(np.argmax(np.abs(values) > LIMITS[unit]))
+        at = rows["t"].iloc[place]
+        raise DataError(
+            f"{name} is {values[place]:.4g} {unit} at {format_moment(at)}, and no ship has more than {LIMITS[unit]:g}: "
+            "is the unit right? List what stands for a missing value in [format] missing, or mend it by a despike",
+            file=file,
+            path=f"columns.{name}" if numbered is None else f"row {int(numbered[np.searchsorted(t, at)]) + 1}",
+        )
 
 
 def _add_records(parts: list[Records]) -> Records:
@@ -355,7 +392,10 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
         other = file.parent / entry.path
-        table = read_log_table(other, entry.format, entry.clock.sources[0])
+        needed = [
+            one for column in mapping.columns.values() if column.file == name for one in source_columns(column.source)
+        ]
+        table = read_log_table(other, entry.format, entry.clock.sources[0], [*entry.clock.sources, *needed])
         times = read_clock(table, entry.clock, entry.format, other, f"file.{name}.clock")
         files[name] = (table, times, entry.format, other)
         records += _skipped_line_records(table)
@@ -375,15 +415,8 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
             (column.unit, *(["%"] if {"factor", "curve"} & column.model_fields_set else [])),
         )
         parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
-        numbers = parts[0]
-        if column.unit == "ddmm":
-            numbers = of_minutes(numbers, table, other, f"columns.{name}.unit")
-        if column.unit == "ais":
-            numbers = of_ais(numbers, table, other, f"columns.{name}.unit")
-        if column.unit == "quaternion":
-            numbers = of_quaternion(parts, source_columns(column.source), table, other, f"columns.{name}.from")
-        elif len(parts) > 1:
-            numbers = of_parts(parts, source_columns(column.source), table, other, f"columns.{name}.from")
+        names, coded = source_columns(column.source), column.unit in CODES and (column.unit != "deg" or len(parts) > 1)
+        numbers = decode_numbers(parts, names, column.unit, table, other, place) if coded else parts[0]
         if column.curve is not None:
             numbers = of_curve(numbers, column.curve, table, other, f"columns.{name}.curve")
         size = to_si(column.unit, name)
@@ -507,28 +540,24 @@ def _cut_files(
     return pd.concat(frames, ignore_index=True), [record] if left else []
 
 
-def _split_runs(log: ImportedLog, name: str) -> Iterator[pd.DataFrame]:
-    """Yield the runs of a log, each after its name in it; a run of a single row is no run."""
+def _split_runs(log: ImportedLog, name: str) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Yield name and rows of the runs of a log, each after its name in it; a run of a single row is no run."""
     t = log.rows["t"].to_numpy()
     starts = np.array([start for start, _ in log.begins])
     number = np.searchsorted(starts, t + clock_slack(t), side="right") - 1
     for index, (_, run) in enumerate(log.begins):
         rows = log.rows.loc[number == index]
         if len(rows) > 1:
-            yield _name_run(rows.reset_index(drop=True), f"{name} {run}")
+            yield f"{name} {clean_name(run)}", rows.reset_index(drop=True)
 
 
-def _distinct_runs(runs: Iterable[pd.DataFrame]) -> Iterator[pd.DataFrame]:
-    """Yield runs with a number after a name that was there already."""
-    taken: set[str] = set()
-    for rows in runs:
-        name = called = str(rows["run"].iloc[0])
-        number = 1
-        while called in taken:
-            number += 1
-            called = f"{name} ({number})"
-        taken.add(called)
-        yield rows if called == name else rows.assign(run=pd.Series(called, index=rows.index, dtype="str"))
+def distinct_names(names: Iterable[str]) -> list[str]:
+    """Names with a number after one that was there already."""
+    taken: dict[str, None] = {}
+    for name in names:
+        numbered = (f"{name} ({number})" for number in itertools.count(2))
+        taken[name if name not in taken else next(one for one in numbered if one not in taken)] = None
+    return list(taken)
 
 
 def _name_run(rows: pd.DataFrame, run: str) -> pd.DataFrame:

@@ -23,8 +23,10 @@ from shipid.logs.dates import (
     time_texts,
 )
 from shipid.logs.formats import Format
-from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, source_columns
+from shipid.logs.mapping import RESTS, Clock, FileClock, Named, clock_seconds, is_dated, source_columns
 from shipid.logs.repairs import Records
+
+SHORTEST = 1e-4  # s between rows, on average: no recorder of a ship has more than 10 kHz
 
 
 def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
@@ -47,6 +49,9 @@ def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: 
             back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}{rollover_words(t[row] - t[row - 1])}"
             what = f"time goes back {back}: sort or split the log"
         raise DataError(what, file=file, path=row_in_words(log, row))
+    if len(t) > 1 and (t[-1] - t[0]) / (len(t) - 1) < SHORTEST:
+        what = f"rows are {(t[-1] - t[0]) / (len(t) - 1):.3g} s apart, as of no ship: is the unit of the clock right?"
+        raise DataError(what, file=file, path=f"{path}.unit")
     return t
 
 
@@ -59,8 +64,8 @@ def read_time_column(
         if clock.date is None:
             return parse_dates(times)
         return parse_dates(join_date_and_time(_as_text(log, clock.date, date_texts, form, file, f"{path}.date"), times))
-    assert isinstance(clock.source, str)
-    return clock_seconds(parse_numbers(log, clock.source, form, file, f"{path}.from"), clock.unit)
+    whole, *rest = (parse_numbers(log, name, form, file, f"{path}.from") for name in source_columns(clock.source))
+    return clock_seconds(whole, clock.unit) + (RESTS[clock.unit] * rest[0] if rest else 0.0)
 
 
 def _as_text(
@@ -111,13 +116,9 @@ def without_repeats(log: pd.DataFrame, clock: Clock, form: Format, file: Path) -
 
 def rows_repeated(table: pd.DataFrame) -> NDArray[np.bool_]:
     """Whether each row (N,) has the values of the row before in all columns."""
-    same = np.ones(len(table), dtype=bool)
+    before = table.shift()
+    same = (table.eq(before) | (table.isna() & before.isna())).fillna(False).all(axis=1).to_numpy(dtype=bool, copy=True)
     same[:1] = False
-    for index in range(table.shape[1]):
-        if not same.any():  # most often the first column is a time
-            break
-        column = table.iloc[:, index]
-        same &= (column.eq(column.shift()) | (column.isna() & column.shift().isna())).to_numpy(dtype=bool)
     return same
 
 

@@ -53,6 +53,8 @@ UNITS: dict[str, dict[str, float]] = {
         "s of week": 1.0,
         "ms of day": 1e-3,
         "ms of week": 1e-3,
+        "s + ns": 1.0,
+        "s + us": 1.0,
     },
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
@@ -67,14 +69,17 @@ UNITS: dict[str, dict[str, float]] = {
 mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 
 `date`, `datenum`, `excel`, `mjd` and `jd` are read as seconds since 1970 (UTC), and so are the times of segments and
-breaks; `hhmmss` as seconds since the first midnight. `ddmm`, of latitude and longitude only, are degrees and minutes;
-`quaternion`, of the heading only, four columns x, y, z, w; `ais`, of the yaw rate only, the numbers of `rate_of_ais`.
+breaks; `hhmmss` as seconds since the first midnight; `s + ns` is of two columns, seconds and the rest of them.
+`ddmm`, of latitude and longitude only, are degrees and minutes; `quaternion`, of the heading only, four columns
+x, y, z, w; `ais`, of the yaw rate only, the numbers of `rate_of_ais`.
 """
 EPOCHS = {"datenum": 719529.0, "excel": float(EXCEL), "mjd": 40587.0, "jd": 2440587.5}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
 or not: IAU resolution B1 of 1997)."""
 AGAIN = {"s of day": DAY, "s of week": 7 * DAY, "ms of day": DAY, "ms of week": 7 * DAY}
 """Unit of a clock that begins again -> after how many seconds."""
+RESTS = {"s + ns": 1e-9, "s + us": 1e-6}
+"""Unit of a clock in two columns -> that of the second [s]."""
 SIDES = {"latitude": "NS", "longitude": "EW"}
 """Column of a position on the Earth -> the letters of its sides in a text, that of positive numbers first."""
 _BOTH = re.compile(r"([^A-Za-z]*\d[^A-Za-z]*[NS])[\s,;/]*([^A-Za-z]+[EW])|([NS][^A-Za-z]+?)[\s,;/]*([EW][^A-Za-z]+)")
@@ -94,6 +99,8 @@ _SIDED = re.compile(
 )
 """An angle to one side of a ship as text: side, degrees, side."""
 REPLACED = {"north": "latitude", "east": "longitude", "u": "speed", "v": "course"}
+Faults = Iterator[tuple[object, str, str]]
+"""Whether something is wrong, the dotted path of it, and what it is."""
 ESTIMATED = ("u", "v", "r")
 Manoeuvre = Literal[
     "zigzag",
@@ -292,33 +299,10 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
         }
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
     clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
-    _check_mapped_columns(mapping, file)
-    _check_missing(mapping, file)
-    _check_instants(mapping, file)
-    _check_segments(mapping, file)
-    repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
-    for index, repair in enumerate(mapping.repair):
-        for column in repair.columns if isinstance(repair, ColumnRepair) else ():
-            if column not in repairable:
-                raise DocumentError(
-                    f"no column {column!r} to repair: {suggest_name(column, repairable)}",
-                    file=file,
-                    path=f"repair.{index}.columns",
-                )
-            if isinstance(repair, ColumnRepair) and repair.of_inputs and column not in mapping.columns:
-                raise DocumentError(
-                    f"{column!r} is made of columns that this repair mends: write two repairs",
-                    file=file,
-                    path=f"repair.{index}.columns",
-                )
-            if isinstance(repair, WrapInterpolation) and not (
-                column in mapping.columns and mapping.columns[column].wrap
-            ):
-                raise DocumentError(
-                    f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair",
-                    file=file,
-                    path=f"repair.{index}.columns",
-                )
+    for check in (_check_mapped_columns, _check_missing, _check_instants, _check_segments, _check_repairs):
+        for wrong, path, message in check(mapping, file):
+            if wrong:
+                raise DocumentError(message, file=file, path=path)
     converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]
     return mapping.model_copy(update={"repair": tuple(converted)})
 
@@ -496,7 +480,7 @@ def _parse_repairs(raw: Any, file: Path) -> Iterator[Repair]:
         yield document.parse_model(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
 
 
-def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
+def _check_mapped_columns(mapping: Mapping, file: Path) -> Faults:
     columns = mapping.columns
     mapped = (
         *required_columns().keys() - {"t"},
@@ -510,193 +494,211 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
             hint = f"or <component>.<signal> with a signal of {signals}"
             raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
         _unit_factor(column.unit, unit, file, f"{path}.unit")
-        if column.unit == "ddmm" and name not in ("latitude", "longitude"):
-            raise DocumentError(
-                "only latitude and longitude are in degrees and minutes: write deg or rad",
-                file=file,
-                path=f"{path}.unit",
-            )
-        if column.unit == "ais" and name != "r":
-            raise DocumentError(
-                "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min",
-                file=file,
-                path=f"{path}.unit",
-            )
+        yield (
+            column.unit == "ddmm" and name not in ("latitude", "longitude"),
+            f"{path}.unit",
+            "only latitude and longitude are in degrees and minutes: write deg or rad",
+        )
+        yield (
+            column.unit == "ais" and name != "r",
+            f"{path}.unit",
+            "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min",
+        )
         four = not isinstance(column.source, str) and len(column.source) == 4
-        if four != (column.unit == "quaternion") or (four and name != "psi"):
-            raise DocumentError(
-                "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi",
-                file=file,
-                path=f"{path}.unit",
-            )
-        if not (four or isinstance(column.source, str)) and (
-            name not in ("latitude", "longitude") or column.unit != "deg"
-        ):
-            raise DocumentError(
-                "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column",
-                file=file,
-                path=f"{path}.from",
-            )
-        if (column.direction is None) == (name == "beta_w"):
-            raise DocumentError(
-                "must be 'towards' or 'from' for beta_w, and belongs to no other column",
-                file=file,
-                path=f"{path}.direction",
-            )
+        yield (
+            four != (column.unit == "quaternion") or (four and name != "psi"),
+            f"{path}.unit",
+            "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi",
+        )
+        yield (
+            (
+                not (four or isinstance(column.source, str))
+                and (name not in ("latitude", "longitude") or column.unit != "deg")
+            ),
+            f"{path}.from",
+            "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column",
+        )
+        yield (
+            (column.direction is None) == (name == "beta_w"),
+            f"{path}.direction",
+            "must be 'towards' or 'from' for beta_w, and belongs to no other column",
+        )
         if column.curve is not None:
             rises = all(first[0] < second[0] for first, second in pairwise(column.curve))
-            if not (is_command(name) or is_output(name)) or column.wrap or not rises:
-                fault = "belongs to a command or output that does not wrap, and the numbers of the log rise in it"
-                raise DocumentError(fault, file=file, path=f"{path}.curve")
-        if column.wrap and unit != "rad":
-            raise DocumentError("only a column in rad or deg can wrap: remove wrap", file=file, path=f"{path}.wrap")
-        if column.relative and name != "beta_w":
-            raise DocumentError(
-                "only beta_w can be relative to the bow: remove relative", file=file, path=f"{path}.relative"
+            yield (
+                not (is_command(name) or is_output(name)) or column.wrap or not rises,
+                f"{path}.curve",
+                "belongs to a command or output that does not wrap, and the numbers of the log rise in it",
             )
+        yield column.wrap and unit != "rad", f"{path}.wrap", "only a column in rad or deg can wrap: remove wrap"
+        yield (
+            column.relative and name != "beta_w",
+            f"{path}.relative",
+            "only beta_w can be relative to the bow: remove relative",
+        )
     for name in sorted(column for column in columns.keys() - {"u", "v"} if columns[column].frame == "earth"):
         raise DocumentError("only u and v can be earth-fixed: remove frame", file=file, path=f"columns.{name}.frame")
-    if "u" in columns and "v" in columns and columns["u"].frame != columns["v"].frame:
-        raise DocumentError(
-            "u and v must be in one frame, both 'body' or both 'earth'", file=file, path="columns.v.frame"
-        )
-    if ("V_w" in columns) != ("beta_w" in columns):
-        raise DocumentError("wind needs both V_w and beta_w", file=file, path="columns")
+    yield (
+        "u" in columns and "v" in columns and columns["u"].frame != columns["v"].frame,
+        "columns.v.frame",
+        "u and v must be in one frame, both 'body' or both 'earth'",
+    )
+    yield ("V_w" in columns) != ("beta_w" in columns), "columns", "wind needs both V_w and beta_w"
 
 
-def _check_missing(mapping: Mapping, file: Path) -> None:
-    """Raise DocumentError unless every required column is mapped, converted from another, or estimated."""
+def _check_missing(mapping: Mapping, _: Path) -> Faults:
+    """Yield the faults of required columns that are not mapped, converted from another, or estimated."""
     columns = mapping.columns
     for name, other in REPLACED.items():
-        if name in columns and other in columns:
-            raise DocumentError(
-                f"{other} is converted to {name}, so both cannot be mapped: remove one of them",
-                file=file,
-                path=f"columns.{name}",
-            )
+        yield (
+            name in columns and other in columns,
+            f"columns.{name}",
+            f"{other} is converted to {name}, so both cannot be mapped: remove one of them",
+        )
     for pair in (("latitude", "longitude"), ("speed", "course")):
         missing = set(pair) - columns.keys()
-        if len(missing) == 1:
-            raise DocumentError(
-                f"missing: {' and '.join(pair)} belong together", file=file, path=f"columns.{missing.pop()}"
-            )
+        yield len(missing) == 1, f"columns.{next(iter(missing), '')}", f"missing: {' and '.join(pair)} belong together"
     for name in sorted(required_columns().keys() - {"t"} - columns.keys()):
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue
         remedy = ", or [estimate]" if name in ESTIMATED else ""
-        raise DocumentError(
-            f"missing: a dataset needs {', '.join(list(required_columns())[1:])}{remedy}",
-            file=file,
-            path=f"columns.{name}",
-        )
-    if mapping.origin is not None and "latitude" not in columns:
-        raise DocumentError(
-            "is used with latitude and longitude only, and they are not mapped: remove it", file=file, path="origin"
-        )
-    if mapping.source.runs is not None and "latitude" in columns and mapping.origin is None:
-        raise DocumentError("missing: one origin for the files of all runs", file=file, path="origin")
+        yield True, f"columns.{name}", f"missing: a dataset needs {', '.join(list(required_columns())[1:])}{remedy}"
+    yield (
+        mapping.origin is not None and "latitude" not in columns,
+        "origin",
+        "is used with latitude and longitude only, and they are not mapped: remove it",
+    )
+    yield (
+        mapping.source.runs is not None and "latitude" in columns and mapping.origin is None,
+        "origin",
+        "missing: one origin for the files of all runs",
+    )
     lacking = [name for name in ESTIMATED if name not in columns and REPLACED.get(name) not in columns]
-    if mapping.estimate is not None and not lacking:
-        raise DocumentError(
-            "u, v and r are all logged, so there is nothing to estimate: remove [estimate]", file=file, path="estimate"
-        )
-    if "u" in columns and columns["u"].frame == "earth" and "v" not in columns:
-        raise DocumentError("an earth-fixed u cannot be turned without v: map v too", file=file, path="columns.u.frame")
+    yield (
+        mapping.estimate is not None and not lacking,
+        "estimate",
+        "u, v and r are all logged, so there is nothing to estimate: remove [estimate]",
+    )
+    yield (
+        "u" in columns and columns["u"].frame == "earth" and "v" not in columns,
+        "columns.u.frame",
+        "an earth-fixed u cannot be turned without v: map v too",
+    )
     for index, repair in enumerate(mapping.repair):
         moves = isinstance(repair, LeverArm) and repair.moves != "position" and not {"u", "v"} <= set(lacking)
-        if moves and "r" in lacking:
-            raise DocumentError(
-                'velocities are moved by r, which is estimated afterwards: write moves = "position"',
-                file=file,
-                path=f"repair.{index}.moves",
-            )
+        yield (
+            moves and "r" in lacking,
+            f"repair.{index}.moves",
+            'velocities are moved by r, which is estimated afterwards: write moves = "position"',
+        )
 
 
-def _check_instants(mapping: Mapping, file: Path) -> None:
-    """Raise DocumentError unless columns with other instants can be interpolated at those of the dataset."""
+def _check_instants(mapping: Mapping, file: Path) -> Faults:
+    """Yield the faults of columns with other instants that cannot be interpolated at those of the dataset."""
     for name, column in mapping.columns.items():
         path = f"columns.{name}"
-        if column.file is not None and column.file not in mapping.file:
-            raise DocumentError(
-                f"no [file.{column.file}]: {suggest_name(column.file, mapping.file)}", file=file, path=f"{path}.file"
-            )
-        if column.interpolation == "angle" and (INPUTS.get(name) or unit_of_column(name)) != "rad":
-            raise DocumentError(
-                "only a column in rad or deg can be interpolated as an angle: use linear or previous",
-                file=file,
-                path=f"{path}.interpolation",
-            )
-        if column.interpolation is not None and not mapping.resamples:
-            raise DocumentError(
-                "nothing is interpolated at other instants: set [clock] step, a latency or a file",
-                file=file,
-                path=f"{path}.interpolation",
-            )
+        yield (
+            column.file is not None and column.file not in mapping.file,
+            f"{path}.file",
+            f"no [file.{column.file}]: {suggest_name(column.file or '', mapping.file)}",
+        )
+        yield (
+            column.interpolation == "angle" and (INPUTS.get(name) or unit_of_column(name)) != "rad",
+            f"{path}.interpolation",
+            "only a column in rad or deg can be interpolated as an angle: use linear or previous",
+        )
+        yield (
+            column.interpolation is not None and not mapping.resamples,
+            f"{path}.interpolation",
+            "nothing is interpolated at other instants: set [clock] step, a latency or a file",
+        )
     for name, entry in mapping.file.items():
         _unit_factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
     clocks: dict[str, Clock | FileClock] = {"clock": mapping.clock}
     clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
     for path, clock in clocks.items():
-        if clock.date is not None and clock.unit != "date":
-            raise DocumentError(
-                f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'",
-                file=file,
-                path=f"{path}.date",
-            )
-        if not isinstance(clock.source, str) and clock.unit != "date":
-            raise DocumentError(
-                "hour, minute and second in several columns are a time of day: write unit = 'date'",
-                file=file,
-                path=f"{path}.unit",
-            )
-    if mapping.resamples and mapping.clock.max_gap is None:
-        raise DocumentError(
-            "missing: columns are interpolated at other instants, so set the longest gap",
-            file=file,
-            path="clock.max_gap",
+        yield (
+            clock.date is not None and clock.unit != "date",
+            f"{path}.date",
+            f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'",
         )
-    if mapping.source.runs is not None and mapping.file:
-        raise DocumentError(
-            "source.runs reads one run from each file, [file.*] several files for one run: remove one of them",
-            file=file,
-            path="source.runs",
+        yield (
+            clock.unit in RESTS and len(source_columns(clock.source)) != 2,
+            f"{path}.from",
+            f"{clock.unit!r} is of two columns: write from = [seconds, the rest of them]",
         )
-    if mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None:
-        raise DocumentError(
-            "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]",
-            file=file,
-            path="parts",
+        yield (
+            not isinstance(clock.source, str) and clock.unit not in ("date", *RESTS),
+            f"{path}.unit",
+            "hour, minute and second in several columns are a time of day: write unit = 'date'",
         )
-    if mapping.parts is not None and mapping.segment:
-        raise DocumentError(
-            "both [parts] and segments say where runs begin: remove one of them", file=file, path="parts"
-        )
+    yield (
+        mapping.resamples and mapping.clock.max_gap is None,
+        "clock.max_gap",
+        "missing: columns are interpolated at other instants, so set the longest gap",
+    )
+    yield (
+        mapping.source.runs is not None and mapping.file,
+        "source.runs",
+        "source.runs reads one run from each file, [file.*] several files for one run: remove one of them",
+    )
+    yield (
+        mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None,
+        "parts",
+        "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]",
+    )
+    yield (
+        mapping.parts is not None and mapping.segment,
+        "parts",
+        "both [parts] and segments say where runs begin: remove one of them",
+    )
     for index, repair in enumerate(mapping.repair):
-        if isinstance(repair, WrapInterpolation) and mapping.resamples:
-            raise DocumentError(
-                "cannot see false samples after resampling: import without step, file and latency",
-                file=file,
-                path=f"repair.{index}.kind",
-            )
+        yield (
+            isinstance(repair, WrapInterpolation) and mapping.resamples,
+            f"repair.{index}.kind",
+            "cannot see false samples after resampling: import without step, file and latency",
+        )
 
 
-def _check_segments(mapping: Mapping, file: Path) -> None:
+def _check_segments(mapping: Mapping, _: Path) -> Faults:
     seen: set[str] = set()
     ends: dict[str | None, float] = {}
     for index, segment in enumerate(mapping.segment):
         path = f"segment.{index}"
-        if segment.run in seen:
-            raise DocumentError(f"a run {segment.run!r} exists: add ' (2)'", file=file, path=f"{path}.run")
-        if not segment.start < segment.end:
-            raise DocumentError(f"start {segment.start:g} must lie before end {segment.end:g}", file=file, path=path)
+        yield segment.run in seen, f"{path}.run", f"a run {segment.run!r} exists: add ' (2)'"
+        yield not segment.start < segment.end, path, f"start {segment.start:g} must lie before end {segment.end:g}"
         seen.add(segment.run)
-        if (segment.file is None) != (mapping.source.runs is None):
-            fault = "names the file of a segment where source.runs reads several, and only there"
-            raise DocumentError(fault, file=file, path=f"{path}.file")
-        if segment.file is not None and segment.start < ends.get(segment.file, -np.inf):
-            fault = f"begins before the last segment of {segment.file!r} ends: write them in order, without overlap"
-            raise DocumentError(fault, file=file, path=f"{path}.start")
+        yield (
+            (segment.file is None) != (mapping.source.runs is None),
+            f"{path}.file",
+            "names the file of a segment where source.runs reads several, and only there",
+        )
+        yield (
+            segment.file is not None and segment.start < ends.get(segment.file, -np.inf),
+            f"{path}.start",
+            f"begins before the last segment of {segment.file!r} ends: write them in order, without overlap",
+        )
         ends[segment.file] = segment.end
+
+
+def _check_repairs(mapping: Mapping, _: Path) -> Faults:
+    repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
+    columns = (
+        (k, one, name) for k, one in enumerate(mapping.repair) if isinstance(one, ColumnRepair) for name in one.columns
+    )
+    for index, repair, name in columns:
+        path = f"repair.{index}.columns"
+        yield name not in repairable, path, f"no column {name!r} to repair: {suggest_name(name, repairable)}"
+        yield (
+            repair.of_inputs and name not in mapping.columns,
+            path,
+            f"{name!r} is made of columns that this repair mends: write two repairs",
+        )
+        yield (
+            isinstance(repair, WrapInterpolation) and not (name in mapping.columns and mapping.columns[name].wrap),
+            path,
+            f"{name!r} does not wrap: write wrap = true in its column, or take it off this repair",
+        )
 
 
 def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import struct
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ ENOUGH_VECTORS = 4  # of one length: clock, position and heading
 MOST_SIGNALS = 100  # columns of a matrix that has fewer rows: more are times
 
 
-def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
+def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> pd.DataFrame:
     """The vectors of a MATLAB file that are as long as the clock, else as the longest with enough, as a table.
 
     `attrs["other"]` says of other variables what they are, and how to make a vector; `attrs["notes"]` are sentences.
@@ -46,7 +46,7 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
         first = next(iter(other), None)
         which = f"; {first!r} is {other[first]}" if first is not None else ""
         raise DataError(f"no variable of this MATLAB file is a vector of numbers{which}", file=file)
-    measure = clock if clock in vectors else _longest_measure(vectors)
+    measure = columns[0] if columns[0] in vectors else _longest_measure(vectors)
     length = len(vectors[measure])
     for name, values in vectors.items():
         if len(values) != length:

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
+import operator
 import re
 import stat
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,28 @@ import pyarrow
 
 from shipid.errors import DataError
 from shipid.files import read_arrow
+from shipid.logs.dataflash import is_dataflash, read_dataflash
 from shipid.logs.foreign import ENOUGH, refuse_foreign
-from shipid.logs.formats import LOOKED_AT, Format, MatFormat, NmeaFormat, ParquetFormat, SheetFormat, TextFormat
+from shipid.logs.formats import (
+    LOOKED_AT,
+    Format,
+    MatFormat,
+    NmeaFormat,
+    ParquetFormat,
+    SheetFormat,
+    TextFormat,
+    TopicsFormat,
+)
 from shipid.logs.mat import is_mat, read_mat
 from shipid.logs.nmea import is_nmea, read_nmea
+from shipid.logs.rosbag import is_bag, read_bag
+from shipid.logs.topics import TopicReader, reads_topics, topic_rows
+from shipid.logs.ulog import is_ulog, read_ulog
 from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_with_values
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
-LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
+LARGE = 4_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
+ROWS_AT_ONCE = 50_000  # of a text, whose cells are Python's until they are a column
 Progress = Callable[[float], None]
 
 
@@ -65,7 +80,7 @@ def read_log_table(
         if isinstance(form, TextFormat) and size > LARGE and columns:
             table = _large_text(file, form, {clock, *columns}, progress, size)
         if table is None:
-            table = READERS[form.kind].read(file, form, clock, progress)
+            table = READERS[form.kind].read(file, form, (clock, *columns), progress)
     except OSError as error:
         if error.errno is None:  # of a library, not of the system
             raise DataError(
@@ -106,102 +121,89 @@ def refuse_power_cut(content: bytes, file: Path) -> None:
         raise DataError("holds NUL bytes, as after a power cut: remove them", file=file, path=f"line {damaged[0]}")
 
 
-def _read_text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
+def _read_text(file: Path, form: TextFormat, columns: Sequence[str], *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
-    _refuse_binary(file, form)
-    return parse_text(file, form, file)
-
-
-def _refuse_binary(file: Path, form: TextFormat) -> None:
-    """Raise DataError where a file is no text in the encoding of its format, or has lines of too many cells."""
     content = file.read_bytes()
     if has_nul(content, form):
         kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, content[:ENOUGH])), None)
-        message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         if kind is not None:
             raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
         refuse_power_cut(content, file)
+        message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         raise DataError(message, file=file, path="format.encoding")
-    check_line_width(content[:LONGEST_LINE], form.separator, file)
+    try:
+        text = io.TextIOWrapper(io.BytesIO(content), encoding=form.encoding, newline="")
+        return parse_text(text, form, file, columns if len(columns) > 1 else ())
+    except UnicodeDecodeError as error:
+        message = (
+            f"not {form.encoding} text (byte {error.start} of a block): set the encoding it was saved in, often cp1252"
+        )
+        raise DataError(message, file=file, path="format.encoding") from None
 
 
-def check_line_width(head: bytes, separator: str, file: Path) -> None:
-    """Raise DataError where a line in the first bytes of a log has more cells than any log has."""
-    mark = b" " if separator == "whitespace" else separator.encode()
-    end = b"\n" if b"\n" in head else b"\r"
-    for line in head.split(end, LOOKED_AT)[:LOOKED_AT]:
-        check_width(line.count(mark) + 1, file)
-
-
-def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.DataFrame:
+def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
     """Read text as a table of text; `file` is the log that errors name. Lines without any value are left out.
+
+    columns : those that are needed; all where one of them is not there, which an error has to say.
 
     A line of another length than the header is an error, or counted in `attrs["ragged"]` if `form.ragged` says so.
     """
-    try:
-        try:
-            table = _read_cells(source, form, _row_width(source, form, file))
-        except pd.errors.ParserError:  # a later line has more cells
-            width = max(len(row) for _, row in _numbered_rows(source, form, file))
-            check_width(width, file)
-            table = _read_cells(source, form, width)
-    except UnicodeDecodeError as error:
-        raise DataError(
-            f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252",
-            file=file,
-            path="format.encoding",
-        ) from None
-    except pd.errors.EmptyDataError:
-        raise _no_rows_error(form, file) from None
-    except (pd.errors.ParserError, ValueError) as error:
-        raise DataError(
-            f"not a table with this separator ({error}): check separator and skip_rows",
-            file=file,
-            path="format.separator",
-        ) from None
-    blank = np.ones(len(table), dtype=bool)
-    for name in table:
-        blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
-    table = table.loc[~blank]
-    if not len(table):
+    rows = _filled_rows(io.StringIO(source, newline="") if isinstance(source, str) else source, form, file)
+    head = list(itertools.islice(rows, LOOKED_AT))
+    if not head:
         raise _no_rows_error(form, file)
-    names, table = _name_columns(table, form, file)
-    table, again = _without_headers(table, names, source, form, file)
-    table, ragged = _without_ragged(table, names, source, form, file)
-    table.columns = pd.Index(names)
+    names = _column_names([row for _, row in head], form, file)
+    width = max((place + 1 for place, name in enumerate(names) if name), default=1)
+    said = names if form.header and form.names is None else None
+    places = [place for place in range(width) if names[place] in columns] if {*columns} <= {*names} else []
+    places = places or [*range(width)]
+    pick = operator.itemgetter(*places) if len(places) > 1 else operator.itemgetter(slice(places[0], places[0] + 1))
+    blocks: list[pd.DataFrame] = []
+    again: list[int] = []
+    ragged: dict[int, int] = {}  # line -> its cells
+    rows = itertools.chain(head[said is not None :], rows)
+    while block := list(itertools.islice(rows, ROWS_AT_ONCE)):
+        kept = []
+        for line, row in block:
+            if len(row) < width or (len(row) > width and any(map(str.strip, row[width:]))):
+                ragged[line] = max(
+                    len(row) if len(row) < width else 0, *(k + 1 for k, one in enumerate(row) if one.strip())
+                )
+            elif (
+                said is not None and row[0].strip() == said[0] and [one.strip() for one in row[:width]] == said[:width]
+            ):
+                again.append(line)
+            else:
+                kept.append(pick(row))
+        blocks.append(pd.DataFrame(dict(enumerate(zip(*kept, strict=True))), columns=range(len(places)), dtype="str"))
+    table = pd.concat(blocks, ignore_index=True) if blocks else pd.DataFrame(columns=range(len(places)), dtype="str")
+    _refuse_wrong_lines(again, ragged, len(table), width, form, file)
+    table.columns = pd.Index([names[place] for place in places])
     table.attrs["ragged"] = sorted([*again, *ragged])
-    return table.reset_index(drop=True)
+    return table
 
 
-def _read_cells(source: Path | io.StringIO, form: TextFormat, width: int) -> pd.DataFrame:
-    """Read all rows as text, also empty ones; raises ParserError where one has more than `width` cells."""
-    if isinstance(source, io.StringIO):
-        source.seek(0)
-    return pd.read_csv(
-        source,
-        sep=r"\s+" if form.separator == "whitespace" else form.separator,
-        encoding=form.encoding,
-        skiprows=form.skip_rows,
-        comment=form.comment,
-        header=None,
-        names=range(width),
-        index_col=False,
-        dtype=str,
-        keep_default_na=False,
-        skip_blank_lines=False,
-    )
-
-
-def _row_width(source: Path | io.StringIO, form: TextFormat, file: Path) -> int:
-    """The largest number of cells in the first rows."""
-    if isinstance(source, Path):
-        with source.open("rb") as stream:
-            source = io.StringIO(stream.read(LONGEST_LINE // 8).decode(form.encoding, "replace"))
-    else:
-        source = io.StringIO(source.getvalue()[: LONGEST_LINE // 8])
-    return max([1, *(len(row) for _, row in islice(_numbered_rows(source, form, file), LOOKED_AT))])
+def _filled_rows(text: io.TextIOBase, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield number of the line, from 1, and cells of each row that has any. DataError where quotes never close."""
+    blanks, before = form.separator == "whitespace", form.skip_rows
+    lines: Iterator[str] = itertools.islice(text, form.skip_rows, None)
+    if form.comment is not None:
+        mark = form.comment
+        lines = ("" if line.startswith(mark) else line for line in lines)
+    if blanks:
+        lines = (line.replace("\t", " ").strip() for line in lines)
+    reader = csv.reader(lines, delimiter=" " if blanks else form.separator, skipinitialspace=blanks)
+    try:
+        for row in reader:
+            if any(map(str.strip, row)):
+                check_width(len(row), file)
+                yield before + 1, row
+            before = form.skip_rows + reader.line_num
+    except csv.Error as error:
+        message = f"a cell without an end ({error}): is its closing quote lacking?"
+        raise DataError(message, file=file, path=f"line {before + 1}") from None
 
 
 def _no_rows_error(form: TextFormat, file: Path) -> DataError:
@@ -211,143 +213,63 @@ def _no_rows_error(form: TextFormat, file: Path) -> DataError:
     return DataError(message, file=file, path="format.skip_rows")
 
 
-def _name_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[list[str], pd.DataFrame]:
-    """A name for every column, empty where the header has none, and the rows below the header."""
-    filled = [bool(table[name].fillna("").str.strip().ne("").any()) for name in table]
-    width = max((index + 1 for index, one in enumerate(filled) if one), default=1)
-    if form.names is not None:
-        if len(form.names) != width and len(form.names) != table.shape[1]:
-            raise DataError(
-                f"{len(form.names)} names for the {width} columns of the log", file=file, path="format.names"
-            )
-        names = [*form.names, *[""] * (table.shape[1] - len(form.names))]
-        return names, table
-    if form.header:
-        return ["" if pd.isna(name) else str(name).strip() for name in table.iloc[0]], table.iloc[1:]
-    return [str(number + 1) if number < width else "" for number in range(table.shape[1])], table
+def _column_names(head: list[list[str]], form: TextFormat, file: Path) -> list[str]:
+    """A name for every column by the first rows, empty where the header has none."""
+    if form.header and form.names is None:
+        return [name.strip() for name in head[0]]
+    width = max(place + 1 for row in head for place, cell in enumerate(row) if cell.strip())
+    if form.names is None:
+        return [str(number + 1) for number in range(width)]
+    if len(form.names) not in (width, max(map(len, head))):
+        message = f"{len(form.names)} names for the {width} columns of the log"
+        raise DataError(message, file=file, path="format.names")
+    return list(form.names)
 
 
-def _without_headers(
-    table: pd.DataFrame, names: list[str], source: Path | io.StringIO, form: TextFormat, file: Path
-) -> tuple[pd.DataFrame, list[int]]:
-    """The rows that do not repeat the header, and the line numbers of the others; refuse them if so declared."""
-    named = [index for index, name in enumerate(names) if name]
-    again = np.zeros(len(table), dtype=bool)
-    if form.header and form.names is None and named:
-        again = table.iloc[:, named[0]].str.strip().eq(names[named[0]]).to_numpy(dtype=bool, na_value=False)
-    for index in named if again.any() else ():
-        again = again & table.iloc[:, index].str.strip().eq(names[index]).to_numpy(dtype=bool, na_value=False)
-    if not again.any():
-        return table, []
-    lines = _line_numbers(table.index[again], source, form, file)
-    if form.ragged == "refuse":
-        more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
+def _refuse_wrong_lines(
+    again: list[int], ragged: dict[int, int], rows: int, width: int, form: TextFormat, file: Path
+) -> None:
+    """Raise DataError for lines that repeat the header, or have another number of cells, and are not to be dropped.
+
+    ragged : line -> its cells. rows : of the others.
+    """
+    if len(ragged) > rows:
         raise DataError(
-            f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'",
-            file=file,
-            path=f"line {lines[0]}",
-        )
-    return table.loc[~again], lines
-
-
-def _without_ragged(
-    table: pd.DataFrame, names: list[str], source: Path | io.StringIO, form: TextFormat, file: Path
-) -> tuple[pd.DataFrame, list[int]]:
-    """The rows with one cell for every name, and the line numbers of the others; refuse them if so declared."""
-    named = [index for index, name in enumerate(names) if name]
-    beyond = [index for index in range(len(names)) if index > (named[-1] if named else 0)]
-    wrong = np.zeros(len(table), dtype=bool)
-    short: dict[int, int] = {}
-    for index in named[-1:]:  # a short line lacks the last cells
-        empty = table.iloc[:, index].fillna("").eq("").to_numpy()
-        short = _short_rows(source, form, {int(number) for number in table.index[empty]}, index + 1, file)
-        wrong |= np.isin(table.index, list(short))
-    for index in beyond:
-        wrong |= table.iloc[:, index].fillna("").str.strip().ne("").to_numpy()
-    lines = _line_numbers(table.index[wrong], source, form, file)
-    if len(lines) > len(table) / 2:
-        raise DataError(
-            f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
-            f"than the header: check separator and skip_rows",
+            f"not a table with this separator: {len(ragged)} of {rows + len(ragged)} lines have another number of "
+            "cells than the header: check separator and skip_rows",
             file=file,
             path="format.separator",
         )
-    if lines and form.ragged == "refuse":
-        first = int(np.argmax(wrong))
-        row = table.iloc[first]
-        filled = row.fillna("").str.strip().ne("").to_numpy()
-        cells = short.get(int(table.index[first]), int(filled.nonzero()[0].max()) + 1)
-        count = len(named) if not beyond or cells < beyond[0] else beyond[0]
-        more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
-        raise DataError(
-            f"{cells} cells, where the header has {count}{more}: correct the line, or set [format] ragged = 'drop'",
-            file=file,
-            path=f"line {lines[0]}",
-        )
-    return (table.loc[~wrong] if lines else table), lines
-
-
-def _short_rows(
-    source: Path | io.StringIO, form: TextFormat, asked: set[int], width: int, file: Path
-) -> dict[int, int]:
-    """Place among `_numbered_rows` -> count of cells of the rows that have fewer than `width` cells."""
-    rows = enumerate(_numbered_rows(source, form, file) if asked else ())
-    return {place: len(row) for place, (_, row) in rows if place in asked and len(row) < width}
-
-
-def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextFormat, file: Path) -> list[int]:
-    """The numbers in the log, from 1, of the first lines of rows at these places among `_numbered_rows`."""
-    asked = set(places)
-    return [
-        number
-        for place, (number, _) in enumerate(_numbered_rows(source, form, file) if asked else ())
-        if place in asked
-    ]
-
-
-def _numbered_rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield number, from 1, and cells of what pandas takes for rows. DataError where quotes never close."""
-    blanks = form.separator == "whitespace"
-    if isinstance(source, Path):
-        text: io.TextIOBase = source.open(encoding=form.encoding, errors="replace", newline="")
-    else:
-        text = io.StringIO(source.getvalue(), newline="")
-    numbers: list[int] = []  # of the lines of a row
-
-    def lines() -> Iterator[str]:
-        for number, line in enumerate(text, start=1):
-            comment = not numbers and form.comment is not None and line.startswith(form.comment)
-            if number > form.skip_rows and not comment:
-                numbers.append(number)
-                yield re.sub(r"[ \t]+", " ", line.strip(" \t\r\n")) if blanks else line
-
-    with text:
-        try:
-            for row in csv.reader(lines(), delimiter=" " if blanks else form.separator):
-                yield numbers[0], row
-                numbers.clear()
-        except csv.Error as error:
-            raise DataError(
-                f"a cell without an end ({error}): is its closing quote lacking?", file=file, path=f"line {numbers[0]}"
-            ) from None
+    for lines, what in ((again, "repeats the header"), ([*ragged], "{} cells, where the header has {}")):
+        if lines and form.ragged == "refuse":
+            first = what.format(ragged.get(lines[0]), width)
+            more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
+            remedy = "remove the line, split the log there" if lines is again else "correct the line"
+            message = f"{first}{more}: {remedy}, or set [format] ragged = 'drop'"
+            raise DataError(message, file=file, path=f"line {lines[0]}")
 
 
 def _large_text(
     file: Path, form: TextFormat, wanted: set[str], progress: Progress | None, size: int
 ) -> pd.DataFrame | None:
     """Read only the wanted columns of a text log, block by block, as numbers; None where that cannot be done."""
-    if form.separator == "whitespace" or form.comment is not None or form.ragged == "drop":
+    if form.comment is not None or form.ragged == "drop":
         return None
+    source: Path | io.BytesIO = file
     with file.open("rb") as stream:
         head = stream.read(1_000_000)
+    if form.separator == "whitespace":
+        if form.encoding.startswith(("utf-16", "utf-32")):
+            return None
+        content = b"\n".join(b"\t".join(line.split()) for line in file.read_bytes().splitlines())
+        source, form, head = io.BytesIO(content), form.model_copy(update={"separator": "\t"}), content[:1_000_000]
     if has_nul(head, form):
         return None
-    check_line_width(head, form.separator, file)
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
     if not text:  # lines end with a carriage return alone
         return None
     try:
-        first = parse_text(io.StringIO(text), form.model_copy(update={"ragged": "drop"}), file)
+        first = parse_text(text, form.model_copy(update={"ragged": "drop"}), file)
     except DataError:  # such as where the last line ends between quotes
         return None
     names = [str(name) for name in first.columns]
@@ -364,7 +286,8 @@ def _large_text(
         for column in [first.iloc[:, index]]
     }
     try:
-        reader = _read_blocks(file, form, len(names), plain)
+        cells = text.split("\n", form.skip_rows + 1)[form.skip_rows].count(form.separator) + 1  # some without a name
+        reader = _read_blocks(source, form, max(len(names), cells), plain)
         about = size * max(1, len(first)) / len(text)  # rows
         columns = _columns_of_blocks(reader, plain, about, progress)
     except (pyarrow.ArrowException, UnicodeError, ValueError):
@@ -378,14 +301,16 @@ def _large_text(
     return None if blank.any() else table  # whether such a line is empty, only all its cells tell
 
 
-def _read_blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) -> Iterator[pyarrow.RecordBatch]:
+def _read_blocks(
+    source: Path | io.BytesIO, form: TextFormat, width: int, plain: dict[int, bool]
+) -> Iterator[pyarrow.RecordBatch]:
     """The columns of a text log at some places, block by block; `plain` says which of them are numbers."""
     import pyarrow.csv as arrow
 
     pyarrow.set_io_thread_count(1)
     _start_threads(2)
     blocks: Iterator[pyarrow.RecordBatch] = arrow.open_csv(
-        file,
+        source,
         arrow.ReadOptions(
             column_names=[str(i) for i in range(width)],
             skip_rows=form.skip_rows + int(form.header and form.names is None),
@@ -451,13 +376,15 @@ def _start_threads(count: int) -> None:
 def _read_sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
     name = sheets_with_values(file)[0] if form.sheet is None else form.sheet
-    return parse_text(io.StringIO(sheet_text(file, name)), form.text(), file)
+    return parse_text(sheet_text(file, name), form.text(), file)
 
 
-def _read_parquet(file: Path, *_: object) -> pd.DataFrame:
+def _read_parquet(file: Path, _: object, columns: Sequence[str], *__: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
-        stored = read_arrow(file)
+        stored = read_arrow(file, columns) if len(columns) > 1 else None
+        if stored is None or not {*columns} <= {*stored.column_names}:  # an error says which there are
+            stored = read_arrow(file)
         nested = {field.name: field.type for field in stored.schema if pyarrow.types.is_nested(field.type)}
         plain = [place for place, field in enumerate(stored.schema) if field.name not in nested]
         # an index is a column
@@ -477,15 +404,17 @@ class LogReader:
     """One format of logs.
 
     options : model of the keys of [format] in a mapping.
-    read : (file, options, name of the column of time, progress as of `read_log_table`) -> table; raises DataError.
+    read : (file, options, columns as of `read_log_table`, that of time first, progress) -> table; raises DataError.
     detect : (file, its first bytes) -> keys of [format] where it is of this format, else None; without it, no guess.
-    scattered : whether rows are single sentences that do not say everything, so that empty cells are no defect.
+    scattered : whether rows are single sentences or messages that do not say everything: empty cells are no defect.
+    topics : the reader of the topics of a recording.
     """
 
     options: type[Format]
-    read: Callable[[Path, Any, str, Progress | None], pd.DataFrame]
+    read: Callable[[Path, Any, Sequence[str], Progress | None], pd.DataFrame]
     detect: Callable[[Path, bytes], dict[str, Any] | None] | None = None
     scattered: bool = False
+    topics: TopicReader | None = None
 
 
 def _is_sheet(_: Path, head: bytes) -> dict[str, Any] | None:
@@ -502,5 +431,23 @@ READERS: dict[str, LogReader] = {
     "parquet": LogReader(ParquetFormat, _read_parquet, _is_parquet),
     "mat": LogReader(MatFormat, read_mat, is_mat),
     "nmea": LogReader(NmeaFormat, read_nmea, is_nmea, scattered=True),
+    "rosbag": LogReader(TopicsFormat, reads_topics(read_bag), is_bag, True, read_bag),
+    "ulog": LogReader(TopicsFormat, reads_topics(read_ulog), is_ulog, True, read_ulog),
+    "dataflash": LogReader(TopicsFormat, reads_topics(read_dataflash), is_dataflash, True, read_dataflash),
 }
 """Kind, as in [format] of a mapping -> reader. To add a format: its options, its two functions, a row here."""
+
+
+def list_topics(file: Path) -> list[dict[str, Any]]:
+    """The topics of a recording: name, count of messages, their rate [Hz], and names of their fields.
+
+    Raises DataError where the file is no recording of topics.
+    """
+    require_file(file)
+    with file.open("rb") as stream:
+        head = stream.read(ENOUGH)
+    read = next((one.topics for one in READERS.values() if one.topics and one.detect and one.detect(file, head)), None)
+    if read is None:
+        kinds = ", ".join(name for name, one in READERS.items() if one.topics)
+        raise DataError(f"has no topics: recordings of these kinds have them: {kinds}", file=file)
+    return topic_rows(read(file, lambda _: True))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 SEPARATOR = "\t"
 WIDEST = 10_000  # cells of a line: more is no log
 LARGEST = 2_000_000_000  # bytes of a workbook once unpacked: some twenty million cells
+LARGE_PART, SQUEEZED = 20_000_000, 100  # bytes of a part, and times its packed size: a sheet is squeezed 5 to 30 times
 FIRST_YEAR = 1904  # of dates of a workbook, 1900 or 1904: no log has one
 _NO_VALUE = re.compile(
     rb"<c ([^>]*)>\s*<f[^>]*?(?:/>|>([^<]*)</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>"
@@ -122,7 +123,10 @@ def _open_workbook(file: Path) -> CalamineWorkbook:
         ) from None
     try:
         with zipfile.ZipFile(file) as packed:
-            size = sum(part.file_size for part in packed.infolist())
+            parts = packed.infolist()
+        size = sum(part.file_size for part in parts)
+        if any(part.file_size > max(LARGE_PART, SQUEEZED * part.compress_size) for part in parts):
+            raise DataError("a part of this workbook unpacks as no sheet does: save its sheet as CSV", file=file)
         if size > LARGEST:
             raise DataError(
                 f"a workbook of {size / 1e9:.1f} GB once unpacked: save its sheet as CSV, which is read by parts",

@@ -200,6 +200,11 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         f"data import --guess raw.csv --names t,x,y --vessel {SHIP} --frame enu",
         {"path": Path("raw.csv"), "names": ("t", "x", "y"), "vessel": is_ship, "frame": "enu"},
     ),
+    "data import topics": (
+        "shipid.logs.readers:list_topics",
+        "data import --topics raw.csv",
+        {"file": Path("raw.csv")},
+    ),
     "data measures": (
         "shipid.logs.measuring:measure_dataset",
         "data measures log.parquet --manoeuvre zigzag --length 28.9",

@@ -42,7 +42,7 @@ def turning(t: np.ndarray, *, u: float = 4.0, v: float = -0.5, r: float = 0.05, 
     north = (u * (np.sin(psi) - np.sin(psi0)) + v * (np.cos(psi) - np.cos(psi0))) / r
     east = (-u * (np.cos(psi) - np.cos(psi0)) + v * (np.sin(psi) - np.sin(psi0))) / r
     return pd.DataFrame(
-        {"t": t, "north": north, "east": east, "psi": psi, "u": u, "v": v, "r": r, "port.n": np.floor(t / 7.0)}
+        {"t": t, "north": north, "east": east, "psi": psi, "u": u, "v": v, "r": r, "port.n": np.floor(t / 7.0) % 1000}
     )
 
 

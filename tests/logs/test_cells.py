@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.cells import log_column, of_minutes, of_quaternion, parse_numbers
+from shipid.logs.cells import decode_numbers, log_column, parse_numbers
 from shipid.logs.formats import TextFormat
 
 FILE = Path("log.csv")
@@ -37,18 +37,20 @@ def test_a_column_that_is_there_twice_or_not_at_all_is_refused() -> None:
 
 def test_degrees_and_minutes() -> None:
     log = pd.DataFrame(index=range(2))
-    np.testing.assert_allclose(of_minutes(np.array([5930.0, -1045.0]), log, FILE, "p"), [59.5, -10.75])
+    np.testing.assert_allclose(
+        decode_numbers([np.array([5930.0, -1045.0])], ("x",), "ddmm", log, FILE, "p"), [59.5, -10.75]
+    )
     with pytest.raises(DataError, match="60 minutes or more"):
-        of_minutes(np.array([5930.0, 5975.0]), log, FILE, "p")
+        decode_numbers([np.array([5930.0, 5975.0])], ("x",), "ddmm", log, FILE, "p")
 
 
 def test_a_quaternion_that_is_none_is_named() -> None:
     """A turn by 90 deg about the vertical axis, and one of twice its size."""
     log, half = pd.DataFrame(index=range(2)), np.sqrt(0.5)
     parts = [np.zeros(2), np.zeros(2), np.array([half, half]), np.array([half, half])]
-    np.testing.assert_allclose(of_quaternion(parts, ("x", "y", "z", "w"), log, FILE, "p"), np.pi / 2)
-    with pytest.raises(DataError, match="size 2 in row 1"):
-        of_quaternion([2 * part for part in parts], ("x", "y", "z", "w"), log, FILE, "p")
+    np.testing.assert_allclose(decode_numbers(parts, tuple("xyzw"), "quaternion", log, FILE, "p"), np.pi / 2)
+    with pytest.raises(DataError, match="2 in row 1 is the size of what has to be a quaternion"):
+        decode_numbers([2 * part for part in parts], tuple("xyzw"), "quaternion", log, FILE, "p")
 
 
 @pytest.mark.parametrize("text", ["51°60.0000'N", "N 51 60.0000", "51 59 60.00 N", "5160.0000N", "160°60'E"])

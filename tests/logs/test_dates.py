@@ -132,16 +132,16 @@ def test_dates_in_columns_of_numbers() -> None:
     year, month, day = [2024.0, 24.0, 68.0, 69.0, 2024.0, 2024.0, 2024.0, 2024.0], [12.0] * 8, [31.0] * 8
     month[4], day[5], day[6], year[7] = 13.0, 32.0, 1.5, np.nan
     texts = date_texts([np.array(one) for one in (year, month, day)])
-    assert texts.tolist() == ["2024-12-31", "2024-12-31", "2068-12-31", "1969-12-31", *[None] * 4]
+    assert texts.fillna("").tolist() == ["2024-12-31", "2024-12-31", "2068-12-31", "1969-12-31", *[""] * 4]
     of_year = date_texts([np.array([2024.0, 2024.0, 2024.0]), np.array([1.0, 366.0, 367.0])])
-    assert of_year.tolist() == ["2024-001", "2024-366", None]
+    assert of_year.fillna("").tolist() == ["2024-01-01", "2024-12-31", ""]
 
 
 def test_times_of_day_in_columns_of_numbers() -> None:
     """A leap second is the first of the next minute; hour 24, minute 60 and second 61 are none."""
     hour, minute, second = [23.0, 0.0, 24.0, 0.0, 0.0], [59.0, 7.0, 0.0, 60.0, 0.0], [59.25, 60.0, 0.0, 0.0, 61.0]
     texts = time_texts([np.array(one) for one in (hour, minute, second)])
-    assert texts.tolist() == ["23:59:59.250000", "00:08:00.000000", None, None, None]
+    assert texts.fillna("").tolist() == ["23:59:59.250000", "00:08:00.000000", "", "", ""]
     assert time_texts([np.array([8.0]), np.array([5.0])]).tolist() == ["08:05:00.000000"]
 
 

@@ -48,9 +48,6 @@ FILES = {
     "records.json": (TABLE.to_json(orient="records").encode(), "JSON", "CSV"),
     "log.xml": (b'<?xml version="1.0"?>\n<log><row>1</row></log>', "XML", "CSV"),
     "log.gpx": (b'<?xml version="1.0"?>\n<gpx version="1.1"><trk></trk></gpx>', "a track", "CSV or NMEA"),
-    "log.bag": (b"#ROSBAG V2.0\n" + BINARY, "a recording of ROS", "topics as CSV"),
-    "log.ulg": (b"ULog\x01\x12\x35\x01" + BINARY, "PX4", "ulog2csv"),
-    "log.bin": (b"\xa3\x95\x80\x80" + BINARY, "ArduPilot", "mavlogdump"),
     "log.tdms": (b"TDSm" + BINARY, "LabVIEW", "CSV"),
     "log.h5": (b"\x89HDF\r\n\x1a\n" + BINARY, "HDF5", "CSV or Parquet"),
     "log.nc": (b"CDF\x01" + BINARY, "netCDF", "CSV or Parquet"),
@@ -59,6 +56,11 @@ FILES = {
     "n2k.json": (
         b'{"version":"5.0.2","units":"std"}\n{"timestamp":"2024-05-14","prio":2,"pgn":127250,"fields":{}}\n',
         "NMEA 2000 as JSON",
+        "a column for each field",
+    ),
+    "expedition.csv": (
+        b"!Boat,Utc,BSP\r\n!boat,0,1\r\n!v12\r\n0,45455.3,1,7.2\r\n",
+        "Expedition",
         "a column for each field",
     ),
     "influx.csv": (
@@ -89,11 +91,11 @@ def test_the_line_names_the_kind_and_what_to_do(name: str, tmp_path: Path) -> No
 
 
 def test_a_data_base_is_named(tmp_path: Path) -> None:
-    with sqlite3.connect(tmp_path / "log.db3") as base:
+    with sqlite3.connect(tmp_path / "log.sqlite") as base:
         TABLE.to_sql("log", base, index=False)
     base.close()
     with pytest.raises(DataError, match="SQLite"):
-        recognise_log(tmp_path / "log.db3")
+        recognise_log(tmp_path / "log.sqlite")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ import pytest
 from shipid.data.dataset import Dataset, flag_bit, stretches_of_runs
 from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
-from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.importing import clean_name, import_log, read_mapping, run_files
+from shipid.logs.mapping import LogSource
 from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, import_written, turning
 
 Write = Callable[..., Path]
@@ -290,7 +291,7 @@ def test_positions_as_text(large: bool, tmp_path: Path, monkeypatch: pytest.Monk
         ),
         ({"month": 13}, 4, "'2023 13 31 23 59 59.5' is no date or time of day"),
         ({"s": None}, 4, "no time here: remove the row"),
-        ({"lon min": 60.5}, 4, "'lon min' is 60.5 in row 4, 60 or more: are these minutes or seconds"),
+        ({"lon min": 60.5}, 4, "'lon min': 60.5 in row 4 is 60 or more: are these minutes or seconds"),
     ],
 )
 def test_parts_that_cannot_be_are_named(change: dict[str, float], row: int, said: str, tmp_path: Path) -> None:
@@ -392,3 +393,55 @@ def test_segments_say_their_file_and_do_not_overlap_in_it(
 ) -> None:
     with pytest.raises(DocumentError, match=message):
         read_mapping(craft_mapping(tmp_path, segments, head))
+
+
+@pytest.mark.parametrize("name", ["N", "u", "rot", "rpm", "heading"])
+@pytest.mark.parametrize("value", [1e300, -(2.0**64)])
+def test_a_value_that_no_ship_has_is_refused_with_its_row(
+    name: str, value: float, log: pd.DataFrame, plain_mapping: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Before, it was imported, and what followed ended in an overflow."""
+    log.loc[40, name] = value
+    with pytest.raises(DataError, match=r"row 41: .* no ship has more than"):
+        import_written(plain_mapping(""), log, tmp_path)
+
+
+def test_a_spike_that_is_mended_is_no_such_value(
+    log: pd.DataFrame, plain_mapping: Callable[[str], Path], tmp_path: Path
+) -> None:
+    log.loc[40, "u"] = 1e30
+    repair = '\n[[repair]]\nkind = "despike"\ncolumns = ["u"]\nwindow = 5.0\nthreshold = 2.0\nreason = "spikes"\n'
+    assert import_written(plain_mapping(repair), log, tmp_path).frame["u"].max() < 5.0
+
+
+def test_a_clock_of_no_ship_is_refused(log: pd.DataFrame, plain_mapping: Callable[[str], Path], tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="is the unit of the clock right"):
+        import_written(plain_mapping(""), log.assign(time=1e-300 * np.arange(len(log))), tmp_path)
+
+
+NAMES_OF_FILES = {
+    "=cmd|calc!A1": "cmd|calc!A1",
+    "@SUM(1)": "SUM(1)",
+    "-2+3|x": "2+3|x",
+    " =A1": "A1",
+    "a\x1b[31mb\n": "a[31mb",
+    "-20": "-20",
+    "+10 stbd": "+10 stbd",
+    "Z_20": "Z_20",
+    "Überfahrt ø": "Überfahrt ø",
+    "=": "run",
+}
+
+
+@pytest.mark.parametrize("name", NAMES_OF_FILES)
+def test_names_of_runs_are_no_formulas_and_steer_no_terminal(name: str) -> None:
+    assert clean_name(name) == NAMES_OF_FILES[name]
+    assert clean_name(NAMES_OF_FILES[name]) == NAMES_OF_FILES[name]
+
+
+def test_names_that_are_one_when_cleaned_stay_two_runs(tmp_path: Path) -> None:
+    for name in ("=a", "@a", "a"):
+        (tmp_path / f"{name}.csv").write_text("t\n1\n")
+    files = run_files(LogSource(runs="*.csv"), tmp_path)
+    assert list(files) == ["a", "a (2)", "a (3)"]
+    assert len({*files.values()}) == 3

@@ -7,7 +7,9 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.instants import even_clock, even_instants
+from shipid.logs.formats import TextFormat
+from shipid.logs.instants import even_clock, even_instants, read_clock
+from shipid.logs.mapping import Clock
 from tests.drawn import seeds
 
 
@@ -59,3 +61,10 @@ def test_a_rounded_clock_keeps_time_where_rows_were_lost(seed: int) -> None:
     apart = np.diff(even) / step
     np.testing.assert_allclose(apart, np.round(apart), atol=1e-6)
     assert apart.min() > 0.5
+
+
+def test_seconds_and_the_rest_of_them_are_one_time() -> None:
+    log = pd.DataFrame({"secs": ["100", "100", "101"], "nsecs": ["0", "500000000", "250000000"]})
+    clock = Clock.model_validate({"from": ("secs", "nsecs"), "unit": "s + ns"})
+    t = read_clock(log, clock, TextFormat(), Path("log.csv"), "clock")
+    np.testing.assert_array_equal(t, [100.0, 100.5, 101.25])

@@ -48,6 +48,8 @@ DEFINED = {  # from the definitions: an inch is 25.4 mm, a nautical mile 1852 m,
         "s of week": 1,
         "ms of day": 1e-3,
         "ms of week": 1e-3,
+        "s + ns": 1,
+        "s + us": 1,
     },
     "m": {"m": 1, "cm": 1 / 100, "mm": 1 / 1000, "km": 1000, "ft": 12 * 0.0254, "nmi": 1852},
     "m/s": {

@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pynmea2
 import pytest
 
 from shipid.errors import DataError
 from shipid.logs.formats import NmeaFormat
+from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
+from shipid.logs.nmea import sentence_moment, sentence_values
 from shipid.logs.readers import READERS, read_log_table
 from tests.logs.conftest import T, turning
 
@@ -243,3 +246,69 @@ def test_messages_of_ais_and_targets_of_a_radar_are_passed_over(tmp_path: Path) 
     assert table.attrs["notes"] == ["sentences of these kinds are not read: AIVDM (180), TTM (30)"]
     with pytest.raises(DataError, match="messages of AIS alone"):
         read(lines[4:5] * 20, tmp_path / "ais")
+
+
+WHERE = "4807.038,N,01131.000,W"
+PLACE = {"latitude": 48 + 7.038 / 60, "longitude": -(11 + 31 / 60)}
+
+
+@pytest.mark.parametrize(
+    ("body", "values"),
+    [
+        (f"GNGNS,120000,{WHERE},AN,09,0.9,5.0,40.0,,", PLACE),
+        (f"GNGNS,120000,{WHERE},NN,09,0.9,5.0,40.0,,", {}),
+        (f"GPGGA,120000,{WHERE},1,8,0.9,5.0,M,46.9,M,,", PLACE),
+        (f"GPGGA,120000,{WHERE},0,0,,,M,,M,,", {}),
+        (f"GPGLL,{WHERE},120000,A", PLACE),
+        (f"GPRMC,120000,A,{WHERE},5.0,,271022", PLACE | {"sog": 5.0}),
+        ("GPRMC,120000,A,,,,,5.0,84.0,271022,,,A", {"sog": 5.0, "cog": 84.0}),
+        ("GPVTG,54.0,T,,M,,N,18.52,K,A", {"cog": 54.0, "sog": 10.0}),
+        ("HETHS,123.4,A", {"heading": 123.4}),
+        ("HETHS,123.4,V", {}),
+        ("TIROT,0.0,A", {"rot": 0.0}),
+        ("AGRSA,0.0,A,-4.0,V", {"rudder": 0.0}),
+        ("IIRPM,S,0,90.0,,A", {"rpm_0": 90.0}),
+        ("IIRPM,S,3,0.0,,A", {"rpm_3": 0.0}),
+        ("WIMWV,0.0,R,36.0,K,A", {"apparent_angle": 0.0, "apparent_speed": 10.0}),
+        ("WIMWD,270.0,T,,M,,N,5.0,M", {"wind_from": 270.0, "wind_speed": 5.0}),
+        ("HCHDG,359.0,2.0,W,3.5,E", {"heading_compass": 0.5}),
+        ("HCHDG,120.0,2.0,W,,", {"heading_magnetic": 118.0}),
+        ("HCHDM,120.0,M", {"heading_magnetic": 120.0}),
+        ("VWVHW,121.0,T,118.0,M,,N,18.52,K", {"heading_log": 121.0, "heading_magnetic": 118.0, "stw": 10.0}),
+    ],
+)
+def test_what_a_sentence_says(body: str, values: dict[str, float]) -> None:
+    """A compass plus its deviation is magnetic, plus the variation true; east is positive (IEC 61162-1)."""
+    assert sentence_values(pynmea2.parse(sentence(body))) == pytest.approx(values)
+
+
+@pytest.mark.parametrize("fields", ["4860.000,N,01131.000,W", "4807.038,,01131.000,W", "4807.038,N,01131.000,N"])
+def test_a_position_that_is_none_is_refused(fields: str) -> None:
+    """Before, a position without its side was at 0 deg."""
+    with pytest.raises(ValueError, match=r"is no (latitude|longitude)"):
+        sentence_values(pynmea2.parse(sentence(f"GPGLL,{fields},120000,A")))
+
+
+def test_fixes_say_the_time_and_others_do_not() -> None:
+    moment = sentence_moment(pynmea2.parse(sentence(f"GPRMC,235960.5,A,{WHERE},5,84,020170")))
+    assert moment == (86400.5, 1.0)
+    assert np.isnan(sentence_moment(pynmea2.parse(sentence("HEHDT,10.0,T")))).all()
+
+
+@pytest.mark.parametrize("time", ["240000", "126000", "120061", "-10000", "12-100"])
+def test_a_time_that_no_day_has_is_refused(time: str) -> None:
+    with pytest.raises(ValueError, match=r"is no time of day|invalid literal|could not convert"):
+        sentence_moment(pynmea2.parse(sentence(f"GPGLL,{WHERE},{time},A")))
+
+
+@pytest.mark.parametrize("kind", ["HCHDG,{:.1f},0.0,E,2.0,E", "HCHDM,{:.1f},M", "VWVHW,{:.1f},T,,M,5.0,N,,K"])
+def test_a_log_whose_heading_is_of_a_compass_or_log_is_drafted(kind: str, tmp_path: Path) -> None:
+    """Before, no column could be the heading; a magnetic one is asked."""
+    text, _ = bridge_log("fix", 3600.0, turning(T))
+    said = [
+        re.sub(r".HEHDT,([\d.]+),T.*", lambda one: sentence(kind.format(float(one[1]))), line) for line in text.split()
+    ]
+    (tmp_path / "log.nmea").write_text("\n".join(said))
+    heading = guess(tmp_path / "log.nmea").column("psi")
+    assert heading is not None
+    assert heading.source == {"HDG": "heading_compass", "HDM": "heading_magnetic", "VHW": "heading_log"}[kind[2:5]]

@@ -15,7 +15,7 @@ from shipid.logs.cells import log_column
 from shipid.logs.dates import parse_dates
 from shipid.logs.formats import ParquetFormat, TextFormat
 from shipid.logs.guess.sniff import recognise_log
-from shipid.logs.readers import check_line_width, read_log_table, require_file
+from shipid.logs.readers import parse_text, read_log_table, require_file
 from shipid.logs.workbook import WIDEST
 from tests.drawn import seeds
 from tests.logs.conftest import NAMES, assert_is_the_motion, mapping_with
@@ -57,6 +57,7 @@ LARGE_TEXTS: dict[str, tuple[TextFormat, str]] = {
     "decimal commas": (TextFormat(separator=";", decimal=","), "a;b;c\n0,5;1;x\n1,5;;y\n2,5;3;z\n"),
     "no header": (TextFormat(names=("a", "b", "c")), "0.5,1,x\n1.5,,y\n2.5,3,z\n"),
     "lines above": (TextFormat(skip_rows=2), "ship\nday\na,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
+    "blanks": (TextFormat(separator="whitespace"), "a b  c\n 0.5 1\tx\n1.5 nan  y \n2.5 3 z\n"),
     "utf-16": (TextFormat(encoding="utf-16"), "a,b,c\n0.5,1,x\n1.5,,y\n2.5,3,z\n"),
 }
 
@@ -150,13 +151,9 @@ def test_a_quote_that_is_never_closed_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("separator", [",", "whitespace"])
 @pytest.mark.parametrize(("cells", "refused"), [(WIDEST, False), (WIDEST + 1, True)])
 def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refused: bool) -> None:
-    mark = b" " if separator == "whitespace" else separator.encode()
-    head = b"t,u\n" + mark.join([b"a"] * cells) + b"\n"
-    if not refused:
-        check_line_width(head, separator, Path("log.csv"))
-        return
-    with pytest.raises(DataError, match=f"a line of more than {WIDEST} cells"):
-        check_line_width(head, separator, Path("log.csv"))
+    text = "t,u\n" + (" " if separator == "whitespace" else separator).join(["a"] * cells) + "\n"
+    with pytest.raises(DataError, match=f"a line of more than {WIDEST} cells" if refused else "not a table with this"):
+        parse_text(text, TextFormat(separator=separator), Path("log.csv"))
 
 
 def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: Path) -> None:
@@ -171,3 +168,14 @@ def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: 
     assert [*table.attrs["other"]] == ["cells", "box"]
     with pytest.raises(DataError, match=r"'box' is nested \(struct<a: int64>\): write each of its values as a column"):
         log_column(table, "box", tmp_path / "log.parquet", "columns.psi.from")
+
+
+@pytest.mark.parametrize("kind", ["text", "parquet"])
+def test_columns_that_are_not_asked_for_are_not_made(kind: str, log: pd.DataFrame, tmp_path: Path) -> None:
+    """Of a name that is not there all are, for the line that says so."""
+    file, form = tmp_path / "log", TextFormat() if kind == "text" else ParquetFormat(kind="parquet")
+    log.to_csv(file, index=False) if kind == "text" else log.to_parquet(file)
+    assert {*read_log_table(file, form, "time", ("u", "N"))} == {"time", "N", "u"}
+    assert list(read_log_table(file, form, "time", ("u", "speed"))) == NAMES
+    alone = read_log_table(file, form, "u", ("u",))
+    np.testing.assert_allclose(pd.to_numeric(alone["u"]), log["u"])

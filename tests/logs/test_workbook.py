@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import sys
+import zipfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -137,3 +138,15 @@ def test_a_formula_without_a_stored_value_is_no_missing_value(tmp_path: Path) ->
         recognise_log(saved(tmp_path / "clock.xlsx", [["time", "x"], *([f"=A{k}", 1.0] for k in range(2, 9))]))
     says = recognise_log(saved(tmp_path / "all.xlsx", [["time", "speed"], *([k, f"=A{k}"] for k in range(2, 9))])).notes
     assert any("column 'speed' holds words, not numbers: '=A2' is a formula" in note for note in says)
+
+
+def test_a_part_that_unpacks_as_no_sheet_does_is_refused_at_once(tmp_path: Path) -> None:
+    """A cell of 900 MB in a file of 1 MB was not read within a minute."""
+    saved(tmp_path / "whole.xlsx", [["time", "x"], [0.0, 1.0], [1.0, 2.0]])
+    with zipfile.ZipFile(tmp_path / "whole.xlsx") as whole, zipfile.ZipFile(tmp_path / "log.xlsx", "w") as packed:
+        for part in whole.infolist():
+            packed.writestr(part, whole.read(part))
+        packed.writestr("xl/sharedStrings2.xml", b"a" * 30_000_000, zipfile.ZIP_DEFLATED)
+    for read in (lambda: rows_of(tmp_path / "log.xlsx"), lambda: recognise_log(tmp_path / "log.xlsx")):
+        with pytest.raises(DataError, match="unpacks as no sheet does"):
+            read()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -40,7 +41,7 @@ from shipid.logs.dates import (
 )
 from shipid.logs.guess.words import NO_VALUE, is_run, name_parts, units_in_name
 from shipid.logs.instants import clock_rounding, even_clock, rows_repeated
-from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, since_midnight, source_columns, to_si
+from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, clock_seconds, since_midnight, source_columns, to_si
 from shipid.logs.workbook import NOT_CALCULATED
 
 Rows = NDArray[np.bool_]
@@ -81,8 +82,8 @@ FIELDS = {
 """Field of a date or time in columns -> words for it, and its least and largest number."""
 YEARS = 1990.0, 2050.0  # of a log
 OF_YEARS = "is a year with decimals, {:.12g}: write a date, 2024-05-14 08:00:00, or seconds"
-FINE = {"ns": (1e17, 1e8), "us": (1e14, 1e5)}
-"""Unit of a clock -> least number that counts from 1970 in it, and least step of whole numbers: 0.1 s."""
+FINE = {"ns": 1e8, "us": 1e5}
+"""Unit of a clock -> least step of whole numbers in it: 0.1 s."""
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "d": 0.0}.items()}
 """Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970. Those of Excel from 2031 and
 modified Julian dates to 2008 are the same numbers."""
@@ -151,6 +152,20 @@ def _in_columns(
     return _rising_clock(keys, parse_dates(texts))
 
 
+def _in_pair(columns: dict[str, Array]) -> tuple[dict[str, Any], Array] | None:
+    """The clock of a log with whole seconds in one column and the rest of them in another, as ROS and C write it."""
+    for name in columns:
+        begin = re.fullmatch(r"(.*?)_?(?:secs?|seconds?)", name)
+        for other, (unit, rest) in itertools.product(columns, RESTS.items()) if begin else ():
+            letters = {"s + ns": r"n(?:ano)?", "s + us": r"(?:u|micro)"}[unit]
+            if re.fullmatch(rf"{re.escape(begin[1] if begin else '')}_?{letters}secs?(?:onds?)?", other):
+                whole, parts = columns[name], columns[other]
+                t = whole + rest * parts
+                if are_whole(whole, LAST_DATE) and parts.max() * rest < 1.0 and np.all(np.diff(t) > 0):
+                    return {"from": [name, other], "unit": unit}, t
+    return None
+
+
 def _rising_clock(keys: dict[str, Any], t: Array) -> tuple[dict[str, Any], Array] | None:
     """The clock with these keys and times (N,) [s], at an even rate where it is rounded; None if it does not rise."""
     if not np.isfinite(t).all():
@@ -211,6 +226,8 @@ def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | N
 
 
 def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
+    if (pair := _in_pair(columns)) is not None:
+        return pair
     finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
     rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
     called = [name for name in columns if is_clock(name)]
@@ -441,12 +458,13 @@ def _unit_of_clock(name: str, values: Array) -> str:
         return "d"  # the day of the year
     if _is_time_of_day(values):
         return "hhmmss"
-    if ends and DATES["d"][0] < values[0] / DAY < DATES["d"][1]:
-        return "s"  # since 1970, however far apart; without the name it may be milliseconds of some weeks
+    since = [
+        unit for unit in ("s", "ms", "us", "ns") if DATES["d"][0] < values[0] * to_si(unit, "t") / DAY < DATES["d"][1]
+    ]
+    if since and (since != ["s"] or ends):  # however far apart; seconds without the name may be milliseconds of weeks
+        return since[0]
     if len(steps) and np.median(steps) >= 20 and not np.any(values % 1):
-        slow = DATES["d"][0] < 1e-3 * values[0] / DAY < DATES["d"][1]  # milliseconds since 1970, however far apart
-        step = 0.0 if slow else float(np.median(steps))
-        return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
+        return next((unit for unit, least in FINE.items() if np.median(steps) >= least), "ms")
     return "s"
 
 

@@ -153,7 +153,7 @@ def _draft_head(guess: Guess) -> Iterator[str]:
     if sparse and not scattered:
         yield f"step = {usual:g}    # s: {', '.join(map(repr, sparse))} has values where it changes: held in between"
     if scattered:
-        yield f"step = {usual:g}    # s: each kind of sentence has other instants; this is the step of the position"
+        yield f"step = {usual:g}    # s: sentences or topics have other instants; this is the step of the position"
     if scattered or guess.kinds & {"holes in time", "missing values"}:
         yield f"max_gap = {longest:g}    # s: missing for less: interpolated, for more: the run breaks"
 

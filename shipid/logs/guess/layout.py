@@ -55,7 +55,7 @@ def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, A
     for reader in READERS.values():
         form = reader.detect(file, head) if reader.detect else None
         if form is not None:
-            return form
+            return form | ({"topics": list(names)} if reader.topics and names else {})
     encoding = _guess_encoding(head, file)
     text = head.decode(encoding, "ignore")
     if is_nmea(file, text.encode("latin-1", "replace")) is not None:
@@ -135,44 +135,47 @@ def _text_format(
     form |= {"thousands": mark} if mark is not None else {}
     if names:
         return form | {"skip_rows": data, "names": list(names)}
-    words = {i: line.split() for i, line in enumerate(lines[:data])}
-    marked = [i for i, some in words.items() if some and some[0] in MARKS]  # a header as a comment, as NumPy writes it
-    for i in marked:
-        blanks = len(words[i]) == width + 1 and rows[i][0] not in MARKS  # between names, and not between numbers
-        rows[i] = words[i][1:] if blanks else rows[i][rows[i][0] in MARKS :]
+    return form | _header_keys(lines, rows, shares, data, width, separator)
+
+
+def _header_keys(
+    lines: list[str], rows: list[list[str]], shares: list[float], data: int, width: int, separator: str
+) -> dict[str, Any]:
+    """The keys of [format] that say the names of the columns, by the lines above that at which the data begin."""
+    dated = _date_and_time(rows[data]) if separator == "whitespace" else None
     sums = [i for i in range(data) if shares[i] > 0.0 and STATISTICS.fullmatch(rows[i][0])]
     above = [i for i in range(data - 1, -1, -1) if any(rows[i]) and i not in sums][:MOST_HEADS]
-    if above and separator == "whitespace" and len(rows[above[0]]) > width:
-        joined = split_cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
-        if len(joined) == width:  # blanks before units
-            return form | {"skip_rows": data, "names": _distinct_columns(joined)}
-    heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
-    dated_at = _date_and_time(rows[data]) if separator == "whitespace" else None
-    if dated_at is not None and heads and len(rows[heads[0]]) == width - 1:  # one name for date and time
-        wide = [[*rows[i][:dated_at], "date", *rows[i][dated_at:]] for i in heads if len(rows[i]) == width - 1]
-        if len(wide) > 1 and _is_units(rows[heads[0]]):
-            pairs = zip(wide[1], ["" if k == dated_at else unit for k, unit in enumerate(wide[0])], strict=True)
-            return form | {"skip_rows": data, "names": _distinct_columns([_with_unit(*pair) for pair in pairs])}
-        return form | {"skip_rows": data, "names": _distinct_columns(wide[0])}
-    called = _header_above([[*rows[i], ""][:width] for i in heads])
+    heads = {i: cells for i in above if (cells := _fit_header(lines[i], rows[i], width, separator, dated))}
+    called, first = _header_above([*heads.values()]), next(iter(heads), None)
+    if not called and first is not None and first == above[0]:
+        if heads[first] == [*rows[first], ""][:width] and not (sums and sums[-1] > first):
+            return {"skip_rows": first}
+        called = heads[first]
     if called:
-        return form | {"skip_rows": data, "names": _distinct_columns(called)}
-    if (
-        heads
-        and heads[0] == above[0]
-        and heads[0] in marked
-        and rows[heads[0]] != split_cells(lines[heads[0]], separator)
-    ):
-        return form | {"skip_rows": data, "names": _distinct_columns([*rows[heads[0]], ""][:width])}
-    if heads and heads[0] == above[0] and sums and sums[-1] > heads[0]:
-        return form | {"skip_rows": data, "names": _distinct_columns([*rows[heads[0]], ""][:width])}
-    if heads and heads[0] == above[0]:
-        return form | {"skip_rows": heads[0]}
+        return {"skip_rows": data, "names": _distinct_columns(called)}
     longer = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
     if longer and not heads:  # a table beside the log ends above this line
         beside = [""] * (max(len(row) for row in rows[longer[-1] + 1 :]) - width)
-        return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct_columns(rows[longer[-1]][:width]), *beside]}
-    return form | {"skip_rows": data, "header": False}
+        return {"skip_rows": longer[-1] + 1, "names": [*_distinct_columns(rows[longer[-1]][:width]), *beside]}
+    return {"skip_rows": data, "header": False}
+
+
+def _fit_header(line: str, row: list[str], width: int, separator: str, dated: int | None) -> list[str]:
+    """The cells of a line above the data, as many as its columns; none where it cannot have a name for each.
+
+    A mark of a comment is left out, blanks before units are of the name, and a date gets one (`dated`: its column).
+    """
+    words = line.split()
+    marked = bool(words) and words[0] in MARKS
+    ways = [row[1:]] if marked and row[0] in MARKS else []
+    ways += [words[1:]] if marked and len(words) == width + 1 and row[0] not in MARKS else []  # as NumPy writes it
+    ways.append(row)
+    if separator == "whitespace":
+        ways.append(split_cells(re.sub(r"\s+(?=[\[(])", "", line), separator)[marked:])
+    if dated is not None:
+        ways.append([*row[:dated], "" if _is_units(row) else "date", *row[dated:]])
+    fitting = sorted((way for way in ways if width - 1 <= len(way) <= width), key=len, reverse=True)
+    return [*fitting[0], ""][:width] if fitting else []
 
 
 def _guess_marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, str, str | None]:

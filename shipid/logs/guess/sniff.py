@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -42,7 +42,6 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import (
     LONGEST_LINE,
     READERS,
-    check_line_width,
     has_nul,
     in_points,
     parse_text,
@@ -73,6 +72,8 @@ NOT_AVAILABLE = {
 """Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
 BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one that has so few values, an order, more
+QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
+"""How the names of x, y, z, w of a quaternion differ; numbers begin with the scalar, as in PX4 and ArduPilot."""
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
 SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
 """Names of columns that say the ship, in small letters alone, the surest first; what they hold for an unknown one."""
@@ -124,7 +125,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
             head = stream.read(LONGEST_LINE)
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
-    if not head[:200_000].strip():
+    if not head[:200_000].strip(b" \t\r\n\xef\xbb\xbf\xff\xfe"):
         raise DataError("the file is empty", file=file)
     form = guess_format(head[:200_000], file, names)
     notes: tuple[str, ...] = ()
@@ -135,11 +136,10 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     if isinstance(model, TextFormat):
         if has_nul(head, model):
             refuse_power_cut(head, file)
-        check_line_width(head, model.separator, file)
         sampled = size > SAMPLE
         lines = _text_sample(file, model.encoding, size)
     if isinstance(model, TableFormat):
-        table = parse_text(io.StringIO(lines), model.text().model_copy(update={"ragged": "drop"}), file)
+        table = parse_text(lines, model.text().model_copy(update={"ragged": "drop"}), file)
         if sampled:
             notes = (f"{len(table)} rows from {BLOCKS + 1} places of {size / 1e6:.0f} MB were looked at",)
         ragged = table.attrs["ragged"]
@@ -371,11 +371,11 @@ def _degree_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
 
 
 def _quaternion_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
-    """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these letters alone, and its size is 1."""
+    """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these alone, and its size is 1."""
     found: dict[str, tuple[str, ...]] = {}
-    for name in columns:
-        place = name.lower().rfind("w")
-        four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in ("XYZW" if "W" in name else "xyzw"))
+    for name, letters in itertools.product(columns, QUATERNIONS):
+        place = name.rfind(letters[3])
+        four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in letters)
         if place >= 0 and {*four} <= columns.keys():
             size = quaternion_size([columns[one] for one in four])
             known = np.isfinite(size) & (size > 0)

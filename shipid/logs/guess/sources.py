@@ -15,7 +15,10 @@ from shipid.logs.guess.words import is_run
 from shipid.logs.importing import run_name
 from shipid.logs.kinds import kind_in_name
 
-ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".xlsx", ".ods", ".parquet", ".mat", ".nmea")
+ENDINGS = (
+    *(".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".xlsx", ".ods", ".parquet", ".mat", ".nmea"),
+    *(".bag", ".mcap", ".db3", ".ulg", ".bin"),
+)
 PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
 STOPPED, FEWEST, HELD = 20.0, 10.0, 10  # usual steps, and s, of a pause between two runs; rows of a run
 

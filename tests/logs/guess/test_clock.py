@@ -389,3 +389,32 @@ def test_a_zone_that_only_the_head_says_is_asked(head: str, clock: str, behind: 
     rows = [f"2024-05-14 08:00:{k:02d}{behind},{k % 7},{k % 5}" for k in range(60)]
     doubts = recognise_log(log_of(tmp_path, [*head.splitlines(), f"{clock},x,y", *rows])).doubts
     assert [f"is read as UTC, and the log says {said!r}" in doubt for doubt in doubts] == [True] * bool(said)
+
+
+@pytest.mark.parametrize(
+    ("names", "unit", "rest"),
+    [
+        (("header.stamp.secs", "header.stamp.nsecs"), "s + ns", 1e-9),
+        (("stamp.sec", "stamp.nanosec"), "s + ns", 1e-9),
+        (("tv_sec", "tv_usec"), "s + us", 1e-6),
+    ],
+)
+def test_a_clock_in_two_columns_is_read_beside_one_that_goes_back(
+    names: tuple[str, str], unit: str, rest: float, tmp_path: Path
+) -> None:
+    """As ROS and C write it; the moments at which messages came are not in order."""
+    rng = np.random.default_rng(3)
+    t = 1_715_673_600 + np.cumsum(rng.uniform(0.05, 0.15, len(TABLE)))
+    whole = np.floor(t)
+    log = TABLE.drop(columns=[name for name in TABLE if name == "time"])
+    log[names[0]], log[names[1]] = whole.astype(int), np.round((t - whole) / rest).astype(int)
+    log["%time"] = np.round(1e9 * (t + rng.normal(0.0, 0.2, len(t)))).astype(np.int64)
+    found = sniff(tmp_path, log)
+    assert found.clock == {"from": [*names], "unit": unit}
+    np.testing.assert_allclose(found.t, t, atol=2e-6)
+
+
+def test_a_number_of_milliseconds_since_1970_may_have_decimals(tmp_path: Path) -> None:
+    log = with_clock("stamp", list(1_715_673_600_000.5 + 100.0 * np.arange(600)))
+    found = sniff(tmp_path, log)
+    assert found.clock == {"from": "stamp", "unit": "ms"}

@@ -174,14 +174,16 @@ def quaternion(yaw: np.ndarray, roll: float = 0.08, pitch: float = -0.03) -> dic
     return dict(zip("xyzw", parts.T, strict=True))
 
 
-@pytest.mark.parametrize(("names", "frame"), [("orientation.{}", "ros"), ("Q_{} [-]", "ned")])
+@pytest.mark.parametrize(("names", "frame"), [("orientation.{}", "ros"), ("Q_{} [-]", "ned"), ("q[{}]", "ned")])
 def test_a_quaternion_is_the_heading(names: str, frame: Frame, tmp_path: Path) -> None:
+    """Numbers begin with the scalar, as in PX4."""
     psi = LOG["psi"].to_numpy()
     four = quaternion(psi if frame == "ned" else np.pi / 2 - psi)
     log = BRIDGE.drop(columns=["psi", "N", "E"]).assign(x=LOG["north" if frame == "ned" else "east"])
     log["y"] = LOG["east" if frame == "ned" else "north"]
     for letter, values in four.items():
-        log[names.format(letter.upper() if "Q" in names else letter)] = values.round(6)
+        number = "wxyz".index(letter)
+        log[names.format(number if "[{" in names else letter.upper() if "Q" in names else letter)] = values.round(6)
     log.to_csv(tmp_path / "log.csv", index=False)
     dataset = import_draft(tmp_path, guess(tmp_path / "log.csv", frame=frame))
     assert turned(dataset).max() < 1e-5
