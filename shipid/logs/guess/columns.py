@@ -29,10 +29,10 @@ from shipid.logs.guess.defects import (
     take_zeros,
 )
 from shipid.logs.guess.lapses import report_command_faults
-from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
+from shipid.logs.guess.motion import check_clock, choose_motion
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
-from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.scales import take_scales
+from shipid.logs.guess.search import Frame
 from shipid.logs.guess.sniff import LogTable
 from shipid.logs.guess.sources import GuessFiles, read_source
 from shipid.logs.guess.stuck import find_stuck
@@ -125,18 +125,13 @@ def guess(
             clock = "a recorder that writes what it has gathered does so: write the time at which each row was measured"
         raise DataError(f"{rows}: {clock}", file=source.path)
     outputs = reserve_outputs(state)
-    choose_pose(state, source.path, frame)
-    if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
-        choose_yaw_rate(state, 0.05)
-    choose_velocities(state)
+    choose_motion(state, source.path, frame)
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
     for doubt in sniffed.doubts:
         state.ask(("clock", "t"), doubt)
     clock = str(sniffed.clock["from"])
     if sniffed.clock["unit"] != "date" and not (is_clock(clock) or state.numbered):
         state.ask(("clock",), f"no column is called a clock: {clock!r} rises from row to row. Is it the time?")
-    if state.r is None:
-        choose_yaw_rate(state)
     choose_commands(state)
     suggest_outputs(state, outputs)
     if vessel is not None:

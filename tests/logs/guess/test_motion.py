@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.motion import (
-    check_clock,
-    choose_velocities,
-    choose_yaw_rate,
-    is_possible,
-)
+from shipid.logs.guess.motion import check_clock, choose_motion
 from tests.logs.conftest import SPEEDS
-from tests.logs.simulated import KNOT, si_log, state_with_pose
+from tests.logs.simulated import KNOT, si_log, state_of, state_with_pose
 
 LOG = si_log()
 T, PSI, U, V, R = (LOG[name].to_numpy() for name in ("t", "psi", "u", "v", "r"))
@@ -21,9 +18,17 @@ BODY = U + 1j * V
 GROUND = BODY * np.exp(1j * PSI)
 
 
+def chosen(columns: dict[str, np.ndarray]) -> State:
+    """The motion of these columns beside a position and a heading."""
+    pose = {"N": LOG["north"].to_numpy(), "E": LOG["east"].to_numpy(), "heading": np.degrees(PSI) % 360.0}
+    state = state_of(pose | columns, T)
+    choose_motion(state, Path("log.csv"))
+    return state
+
+
 def described(state: State) -> dict[str, tuple[str, str, int]]:
     """Column of the dataset -> source, unit, sign."""
-    return {c.name: (c.source, c.unit, c.extra.get("sign", 1)) for c in state.suggestions}
+    return {c.name: (c.source, c.unit, c.extra.get("sign", 1)) for c in state.suggestions if c.name in ("u", "v", "r", "speed", "course")}
 
 
 def kinds(state: State) -> set[str]:
@@ -57,8 +62,7 @@ VELOCITIES: dict[str, tuple[dict[str, np.ndarray], dict[str, tuple[str, str, int
 @pytest.mark.parametrize("name", VELOCITIES)
 def test_velocities(name: str) -> None:
     columns, expected, findings = VELOCITIES[name]
-    state = state_with_pose(columns)
-    choose_velocities(state)
+    state = chosen(columns)
     assert described(state) == expected
     assert kinds(state) == findings
     if expected:
@@ -69,8 +73,7 @@ def test_velocities(name: str) -> None:
 
 
 def test_a_factor_is_seen_with_its_error() -> None:
-    state = state_with_pose({"u": 1.05 * U, "v": 1.05 * V})
-    choose_velocities(state)
+    state = chosen({"u": 1.05 * U, "v": 1.05 * V})
     (finding,) = state.findings
     assert finding.kind == "factor"
     assert finding.repair is not None
@@ -92,9 +95,8 @@ def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> No
 
     Millimetres a second, and a clock in ms, leave one track: without a name that is asked.
     """
-    state = state_with_pose(spoken(unit, kind, named))
-    choose_velocities(state)
-    assert {one.unit for one in state.suggestions if one.name != "course"} == {unit}
+    state = chosen(spoken(unit, kind, named))
+    assert {one.unit for one in state.suggestions if one.name in ("u", "v", "speed")} == {unit}
     usual = unit == "m/s" or (kind != "body" and unit in ("kn", "km/h"))
     assert kinds(state) == (set() if named or usual else {"knots"} if unit == "kn" else {"speed unit"})
     assert len(state.questions) == (unit == "mm/s" and not named)
@@ -106,7 +108,6 @@ def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> No
 def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> None:
     """Without velocities in the log the pace of the track says that the clock has another unit."""
     state = state_with_pose({}, 1.0 / wrong)
-    assert is_possible(state) == (not asked)
     check_clock(state)
     check_clock(state)  # once is enough
     assert len(state.questions) == asked
@@ -125,8 +126,7 @@ def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> Non
     ids=["deg/s", "sign", "unit", "misleading", "none", "roll"],
 )
 def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int] | None, findings: set[str]) -> None:
-    state = state_with_pose(columns)
-    choose_yaw_rate(state)
+    state = chosen(columns)
     assert described(state).get("r") == expected
     assert kinds(state) == findings
     if expected is not None:
@@ -145,8 +145,7 @@ def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, 
     """As by the north of a map or a compass; it is no factor of the speed, which its cosine looked like."""
     turn = np.radians(degrees)
     there = GROUND * np.exp(1j * turn)
-    state = state_with_pose({"v north": there.real, "v east": there.imag} if earth else over_ground(turn))
-    choose_velocities(state)
+    state = chosen({"v north": there.real, "v east": there.imag} if earth else over_ground(turn))
     assert not state.findings
     assert len(state.questions) == (abs(degrees) >= 1.0)
     for question in state.questions:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from shipid.data.dataset import Dataset
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.pose import Frame
+from shipid.logs.guess.search import Frame
 from tests.logs.simulated import as_bridge, drafted, guess_of, import_draft, si_log
 
 LOG = si_log()
