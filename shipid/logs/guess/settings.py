@@ -39,7 +39,7 @@ class SearchSettings:
         times a unit may be off that before it is doubted.
     alike : ratio of two scales that are one.
     least_part : share of all motion that a part with another unit has.
-    two_left : share of what one scale leaves that two leave, at most.
+    two_left, two_left_of_turns : share of what one scale leaves that two leave, at most; of what turns the ship.
     steady : share of the mean wind speed by which a wind may change while the ship turns.
     """
 
@@ -74,6 +74,7 @@ class SearchSettings:
     alike: float = 1.4
     least_part: float = 0.05
     two_left: float = 0.3
+    two_left_of_turns: float = 0.75
     steady: float = 0.3
 
 

@@ -99,5 +99,5 @@ def test_an_angle_that_turns_the_ship_otherwise_is_asked_under_way_alone(seed: i
     state.position = np.cumsum(speed * np.exp(1j * state.psi)) + random.normal(0, 0.3, len(t))
     state.suggest("thruster.alpha", "azimuth", "rad", 0.9, "by its name")
     ask_for_changes(state)
-    asked = [one.sentence for one in state.questions if "turn the ship to the other side" in one.sentence]
+    asked = [one.sentence for one in state.questions if "times as fast: to the other side" in one.sentence]
     assert len(asked) == (not slow)
