@@ -77,7 +77,9 @@ def _columns_of_commands(
         if against[row, best] >= OTHER_SIDE:
             words = f"is {name} as {drafted[best].source!r}? The log has no column of that side"
             state.ask((signal_of(name),), words)
-    rest = [one.source for col, one in enumerate(drafted) if one not in found.values() and against[:, col].min() < NEVER]
+    rest = [
+        one.source for col, one in enumerate(drafted) if one not in found.values() and against[:, col].min() < NEVER
+    ]
     if rest:
         taken = [one.source for one in found.values()]
         words = f"{', '.join(found)} {'are' if len(found) > 1 else 'is'} {', '.join(map(repr, taken))}"
@@ -127,15 +129,10 @@ def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Sugg
     seen, right = state.turning.get(one.source), helm.get(one.name)
     if seen is None or right is None or (seen != right) == ("sign" in one.extra):
         return one
-    kind = "wrong sign of rudder"
-    state.findings[:] = [each for each in state.findings if (each.kind, each.columns) != (kind, (one.source,))]
     extra = {key: value for key, value in one.extra.items() if key != "sign"}
-    if seen != right:
-        extra["sign"] = -1
-        sides = ("starboard", "port") if seen > 0 else ("port", "starboard")
-        words = f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[1]}"
-        state.find(kind, (one.source,), one.confidence, words)
-    return replace(one, extra=extra)
+    sides = ("starboard", "port") if seen > 0 else ("port", "starboard")
+    why = f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[seen != right]}"
+    return replace(one, evidence=why, extra=extra | ({"sign": -1} if seen != right else {}))
 
 
 def _take_tunnels(state: State, names: Sequence[str]) -> None:

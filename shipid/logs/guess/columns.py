@@ -29,7 +29,7 @@ from shipid.logs.guess.defects import (
     take_zeros,
 )
 from shipid.logs.guess.lapses import report_command_faults
-from shipid.logs.guess.motion import check_clock, choose_motion
+from shipid.logs.guess.motion import check_clock, choose_motion, report_misnomers
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.search import Frame
@@ -136,6 +136,7 @@ def guess(
     suggest_outputs(state, outputs)
     if vessel is not None:
         name_commands(state, vessel)
+    report_misnomers(state)
     _choose_other_columns(state)
     choose_wind(state)
     defects_of_rows(state, sniffed)

@@ -140,8 +140,6 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
         confidence, why = 0.3, f"by its name; up to {top:.4g}{share or ', and never negative'}"
     if effect and not unsided and (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is one aft of the origin
         extra["sign"] = -1
-        words = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
-        state.find("wrong sign of rudder", (name,), confidence, words)
     if signal == "alpha":
         _ask_for_half_turn(state, name, unit, int(extra.get("sign", 1)))
     side = state.side_of(name)
@@ -254,8 +252,7 @@ def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict
         why += more
         if not tunnel and not azimuth and _runs_astern(state, name):
             extra = {**extra, "sign": -1}
-            words = f"{name!r} is negative while the ship goes ahead; here ahead is positive"
-            state.find("wrong sign of the shaft", (name,), 0.9, words)
+            why += "; negative while the ship goes ahead"
     state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
@@ -276,9 +273,7 @@ def _unit_of_shaft(
     if written is not None and not tunnel:
         far = off.get(written, 1.0)
         if written != likely and far > SETTINGS.near > 3 * off[likely]:
-            words = f"{name!r} says {written}, but the ship would run {far:.0f} times too far or too little in a turn"
-            state.find("unit of the shaft", (name,), 0.6, f"{words} of the shaft: it is read in {likely}")
-            return likely, 0.6, f"; the way in a turn of the shaft says {likely}", {}
+            return likely, 0.6, f"; the way in a turn of the shaft is {far:.0f} times off in {written}", {}
         if written != "rad/s" and top * to_si(written, "propeller.n") > GEARED and is_engine(name):
             words = f"{begins} {written}, is the speed of an engine: is there a gear?"
             state.ask(about, f"{words} Write factor = 1 / its ratio")

@@ -20,7 +20,6 @@ TURNS = (360.0, 2 * np.pi, 400.0, 3600.0, 36000.0, 6400.0)  # a whole turn in de
 GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
 WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
-FEW = 30  # values: fewer may be round by chance
 HOLE = 3.0  # times the usual step
 WILD, RARE = 5.0, 0.03  # times the larger rates, and share of the windows at most: then it is no turn of a ship
 LIVELY = 0.1  # of the larger changes over a window: in one of less nothing happens
@@ -101,13 +100,6 @@ def fit_without_outliers(seen: Complex, integrated: Complex) -> Fit:
     """Fit one real scale to the windows without outliers."""
     keep = windows_without_outliers(seen, integrated)
     return fit_scale(seen[keep], integrated[keep])
-
-
-def course_agreement(track: Complex, psi: Array) -> complex:
-    """The mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
-    turned = track * np.exp(-1j * psi)
-    size = float(np.sum(np.abs(turned)))
-    return complex(np.sum(turned)) / size if size > 0 else 0j
 
 
 def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -276,35 +268,6 @@ def interpolated_share(values: Array) -> float:
     if moving.sum() < 50 or quantum > 1e-5 * scale:  # rounded values lie on lines by chance
         return 0.0
     return float(np.mean(np.abs(second[moving]) < 1e-9 * scale))
-
-
-def value_lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
-    """The multiplier in [low, high] that makes values round, how well (0 to 1), and the number of values used.
-
-    R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x are whole multiples of the quantum, about N^-1/2 else.
-    Values equal in two rows are used, for these are not interpolated; if they are few, all.
-    """
-    still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
-    asked = still if len(still) >= FEW else np.unique(values)[:400]
-    if len(asked) < FEW or _roundness_of(asked, np.ones(1), 1e-4)[0] > 0.8:  # round already: nothing was converted
-        return 0.0, 0.0, len(asked)
-    for quantum in (0.1, 0.01):
-        if low * float(np.ptp(asked)) < 20 * quantum:
-            continue  # too few multiples to be missed
-        step = quantum / 8 / float(np.abs(asked).max())
-        multipliers = np.arange(low, high, step)
-        best = multipliers[np.argmax(_roundness_of(asked[:: max(1, len(asked) // 60)], multipliers, quantum))]
-        finer = best + np.linspace(-step, step, 101)
-        sizes = _roundness_of(asked, finer, quantum)
-        if sizes.max() > 0.8:
-            return float(finer[np.argmax(sizes)]), float(sizes.max()), len(asked)
-    return 0.0, 0.0, len(asked)
-
-
-def _roundness_of(values: Array, multipliers: Array, quantum: float) -> Array:
-    """Return R, the roundness from 0 to 1, for every multiplier, (K,)."""
-    phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
-    return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
 
 
 def spike_rows(values: Array) -> NDArray[np.bool_]:

@@ -9,11 +9,10 @@ import numpy as np
 
 from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State, si_unit, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
-    DIRECTIONS,
     LENGTHS,
     PLAIN,
     WAYS,
@@ -29,6 +28,7 @@ from shipid.logs.guess.search import (
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores
 from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
+from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
 
 ABREAST = np.radians(0.5)  # by which two headings of one ship may differ
@@ -71,7 +71,7 @@ def _take_pose(state: State, best: Motion) -> None:
     for name, source in zip(("latitude", "longitude") if place.on_globe else ("north", "east"), sources, strict=True):
         state.suggest(name, source, length, sure, why)
     state.position = plane * (1.0 if place.on_globe else to_si(length, "north"))
-    _find_axes(state, best, sources, sense)
+    _report_axes(state, best, sources, sense)
     named = meaning_scores(pose.heading)
     if not state.numbered and named.get("psi", 0.0) <= named.get("course", 0.0):
         sure = min(sure, 0.5)
@@ -94,77 +94,47 @@ def _take_pose(state: State, best: Motion) -> None:
     state.psi = sense.direction(angle * to_si(pose.unit, "psi"))
 
 
-def _find_axes(state: State, best: Motion, sources: tuple[str, str], sense: Sense) -> None:
-    """Note axes and a heading that are not as their names say, and ask where another reading is nearly as likely."""
+def _report_axes(state: State, best: Motion, sources: tuple[str, str], sense: Sense) -> None:
+    """Note axes and a heading that count otherwise than usual, and ask where another reading is nearly as likely."""
     pose, axes = best.pose, best.axes
     agreement = 1.0 - pose.misfit
-    north, east = sources
+    words = _reading_in_words(best, axes)
     if pose.astern:
         state.astern = True
         shafts = [name for name in state.called("n") if np.median(state.columns[name]) < 0.0]
         why = f"{shafts[0]!r} is negative" if shafts else "another heading would not fit"
         if best.velocity is not None and best.velocity.kind == "body":
             why = f"{best.velocity.first!r} along the heading gives the track"
-        words = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
-        state.find("astern", (pose.heading,), 0.8, words)
-    if best.settled in state.columns and axes != Axes():
-        words = f"{best.settled!r} agrees with the track only with {north!r} as north and {east!r} as east"
-        state.find("frame by course or velocity", sources, 0.9, words)
-    flipped = [name for name, sign in zip(sources, (axes.north, axes.east), strict=True) if sign < 0]
-    if axes.swap and not best.settled.startswith("--"):
-        words = f"course and heading agree with {east!r} as east and {north!r} as north"
-        said = any(DIRECTIONS & {*name.lower().split()} for name in sources)
-        said = said or meaning_scores(east).get("north", 0.0) > 0.9
-        if not state.numbered and not best.settled:
-            state.find("north and east swapped" if said else "x is east", sources, agreement, words)
-    if pose.place.on_globe and flipped:
-        ways = {north: ("north", "south"), east: ("east", "west")}
-        words = " and ".join(f"{name!r} to {ways[name][name in state.negated]}" for name in flipped)
-        state.find(
-            "sign of a position", tuple(flipped), agreement, f"course and heading agree if the log counts {words}"
-        )
+        said = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
+        state.find("astern", (pose.heading,), 0.8, said)
+    elif sense.quarter == 2 and sense.sign > 0:
+        said = f"does the ship go astern, or has {pose.heading!r} another zero? If it goes astern, take the offset out"
+        state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {said}")
+    if (axes != Axes() or sense != Sense()) and not best.settled.startswith("--"):
+        shown = f", as {best.settled!r} shows" if best.settled else ""
+        state.find("frame", (*sources, pose.heading), agreement, f"course and heading agree with {words}{shown}")
+    if pose.place.on_globe and axes != Axes():
+        said = " and ".join(f"{name!r} to {way}" for name, way in zip(sources, _ways(axes), strict=True))
         state.ask(
-            ("latitude", "longitude", "psi"), f"does the log count {words}? Else {pose.heading!r} counts otherwise"
+            ("latitude", "longitude", "psi"), f"does the log count {said}? Else {pose.heading!r} counts otherwise"
         )
-    if pose.place.on_globe and meaning_scores(north).get("longitude", 0.0) > meaning_scores(north).get("latitude", 0.0):
-        words = f"course and heading agree only with {north!r} as latitude and {east!r} as longitude"
-        state.find("latitude and longitude swapped", sources, agreement, words)
-    kinds = {
-        (-1, 1): "heading counted from east",
-        (-1, -1): "heading counted from west",
-        (-1, 0): "heading counted to port",
-    }
-    kind = kinds.get((sense.sign, sense.quarter), "zero of the heading")
-    if sense != Sense() and not best.settled.startswith("--"):
-        words = f"{pose.heading!r} {_sense_in_words(sense)}, as course and heading agree"
-        state.find(kind, (pose.heading,), agreement, words)
-        if abs(sense.quarter) == 2 and sense.sign > 0:
-            words = (
-                f"does the ship go astern, or has {pose.heading!r} another zero? If it goes astern, take the offset out"
-            )
-            state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {words}")
-    if best.rival is not None and not pose.place.on_globe:
-        one, other = (_reading_in_words(best, each) for each in (axes, best.rival))
+    elif best.rival is not None:
         sides = "; port and starboard change places" * (axes.hand != best.rival.hand)
-        words = f"{one}, or {other}? Motion is the same in both{sides}: answer with --frame ned, enu, zup or ros"
-        state.ask(("psi", "north", "east"), words)
-    elif pose.undecided and pose.misfit < SETTINGS.poor and best.rival is not None:
-        words = f"the ship turns too little to show which way {pose.heading!r} counts: to starboard?"
-        state.ask(("psi",), words)
+        said = f"is {words}, or {_reading_in_words(best, best.rival)}? Motion is the same in both{sides}"
+        state.ask(("psi", "north", "east"), f"{said}: answer with --frame ned, enu, zup or ros")
+
+
+def _ways(axes: Axes) -> list[str]:
+    """To where the first and the second axis point."""
+    ways = [WAYS[0 if axes.north > 0 else 2], WAYS[1 if axes.east > 0 else 3]]
+    return ways[::-1] if axes.swap else ways
 
 
 def _reading_in_words(best: Motion, axes: Axes) -> str:
-    place, sense = best.pose.place, axes.sense(best.pose.sense)
-    ways = [WAYS[0 if axes.north > 0 else 2], WAYS[1 if axes.east > 0 else 3]]
-    ways = ways[::-1] if axes.swap else ways
-    return (
-        f"is {place.first!r} to {ways[0]}, {place.second!r} to {ways[1]}, and {best.pose.heading!r} "
-        f"{_sense_in_words(sense)}"
-    )
-
-
-def _sense_in_words(sense: Sense) -> str:
-    return f"counts to {'starboard' if sense.sign > 0 else 'port'} from {WAYS[sense.quarter % 4]}"
+    place, sense, ways = best.pose.place, axes.sense(best.pose.sense), _ways(axes)
+    side = "starboard" if sense.sign > 0 else "port"
+    counts = f"{best.pose.heading!r} counted to {side} from {WAYS[sense.quarter % 4]}"
+    return f"{place.first!r} to {ways[0]}, {place.second!r} to {ways[1]}, {counts}"
 
 
 def _ask_about_names(state: State, best: Motion) -> None:
@@ -242,15 +212,8 @@ def _take_velocities(state: State, best: Motion, found: Velocity) -> None:
         state.suggest("course", second, turned, 0.9, why, **extra)
     else:
         why = f"integrated as {found.kind}-fixed [{unit}] it {leaves}"
-        swapped = first in state.all_called("v") and second in state.all_called("u")
-        if found.named < 0.45 and not state.numbered and not swapped:
+        if found.named < 0.45 and not state.numbered:
             confidence = min(confidence, 0.59)
-            names = f"{first!r} and {second!r}"
-            words = f"{names} are not named as velocities, but their integral is the track"
-            state.find("velocities under other names", sources, 0.6, words)
-        if swapped and found.kind == "body":
-            words = f"{first!r} is along the heading, {second!r} across it"
-            state.find("u and v swapped", sources, confidence, words)
         _suggest_two(state, best, found, unit, confidence, why)
     state.velocity, state.body = ground, np.asarray(ground / heading)
     fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
@@ -266,17 +229,8 @@ def _suggest_two(state: State, best: Motion, found: Velocity, unit: str, confide
         pair = (second, first) if axes.swap else (first, second)
         for name, source, sign in zip(("u", "v"), pair, signs, strict=True):
             state.suggest(name, source, unit, confidence, why, frame="earth", **({"sign": -1} if sign < 0 else {}))
-        ahead = meaning_scores(first).get("u", 0.0)
-        if ahead > meaning_scores(first).get("velocity_north", 0.0) and first in state.all_called("u"):
-            words = (
-                f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
-            )
-            state.find("earth-fixed velocities", (first, second), confidence, words)
         return
     sign = found.side * axes.hand
-    if sign < 0 and not axes.hand < 0:
-        words = f"{second!r} is positive to port: the track is met with its sign changed"
-        state.find("wrong sign of v", (second,), confidence, words)
     if found.unsure:
         words = (
             f"is {second!r} positive to {'starboard' if sign > 0 else 'port'}? It is drafted so that the ship drifts"
@@ -315,11 +269,6 @@ def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool
         state.ask(("t", "u", "v", "speed"), f"{words}: the track is {fit.scale:.4g} times the integral of {name!r}")
         state.find("clock unit", sources, 0.6, f"a clock in {other} would explain the track") if not rivals else None
         unit, part = ranked[0][:2] if rivals else (unit, part)
-    if part == 1.0 and unit != (written or (unit if quiet and unit in PLAIN else "m/s")):
-        word = "knots" if "kn" in (unit, written) else "speed unit"
-        words = f"the name says {written}" if written else "nothing says so"
-        begins = f"the track is {fit.scale:.3f} times the integral: {name!r} is in {unit} ({words})"
-        state.find(word, sources, 0.95, begins)
     return unit, part
 
 
@@ -333,17 +282,8 @@ def _report_factor(state: State, fit: Fit, sources: tuple[str, ...], unit: str, 
             state.find("factor", sources, 0.6, f"{begins}: {words}")
             state.ask(("t", *columns), f"are the units of the clock, of the positions and of {pair} right? {begins}")
         return
-    per_knot = UNITS["m/s"][unit] / UNITS["m/s"]["kn"]
-    rounds = [evidence.value_lattice(state.columns[one], 0.85 * per_knot, 1.15 * per_knot) for one in sources]
-    multiplier, roundness, count = max(rounds, key=lambda one: one[1:])
-    factor, off = multiplier / per_knot, abs(fit.scale - 1.0)
-    if roundness > 0.9 and unit != "kn":
-        if abs(factor - fit.scale) < max(0.03, 3 * fit.error) and abs(factor - 1.0) > 1e-3:
-            words = f"{count} values are round in knots if divided by {multiplier:.4f}, not {per_knot:.4f}"
-            words += f" (the track says {fit.scale:.3f} +- {fit.error:.3f})"
-            repair = {"kind": "scale", "columns": list(columns), "factor": round(factor, 4)}
-            state.find("factor", sources, 0.95, words, repair)
-    elif np.isfinite(fit.error) and off > max(3 * fit.error, 0.004):
+    off = abs(fit.scale - 1.0)
+    if np.isfinite(fit.error) and off > max(3 * fit.error, 0.004):
         sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
         repair = {"kind": "scale", "columns": list(columns), "factor": round(fit.scale, 4)}
         state.find("factor", sources, sure, f"{begins} (+- {fit.error:.2g})", repair)
@@ -406,14 +346,6 @@ def _take_rate(state: State, best: Motion) -> None:
             state.find("missing values", (name,), 0.95, words)
     sign = (1 if fit.scale > 0 else -1) * best.axes.hand
     confidence = 0.99 * (1 - min(0.5, fit.left))
-    if sign < 0:
-        state.find("wrong sign of r", (name,), confidence, f"{name!r} is positive where the heading falls")
-    if name not in called and not name.isdecimal():
-        other = f", which {called[0]!r} is not" if called else ""
-        state.find("yaw rate under another name", (name,), confidence, f"{name!r} is the rate of the heading{other}")
-    written = unit_in_name(name, "rad/s")
-    if written is not None and written != unit:
-        state.find("unit of r", (name,), confidence, f"{name!r} says {written}, but is in {unit}")
     why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
     state.suggest("r", name, unit, confidence, why, **({"sign": -1} if sign < 0 else {}))
     state.r = state.columns[name] * to_si(unit, "r") * sign
@@ -437,3 +369,23 @@ def check_clock(state: State, length: float = np.inf) -> None:
         f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
     )
     state.ask(("t", "north", "east"), f"{words}: are the units of the clock and of the positions right?")
+
+
+def report_misnomers(state: State) -> None:
+    """Report columns whose names say another quantity or unit than the motion does, or that count the other way."""
+    for one in state.suggestions if not state.numbered else ():
+        signal = signal_of(one.name)
+        meaning = {"u": "velocity_north", "v": "velocity_east"}.get(signal, signal) if "frame" in one.extra else signal
+        names = {meaning, *({"x", "y"} if meaning in ("north", "east") else ())}
+        scores = meaning_scores(one.source)
+        written = unit_in_name(one.source, si_unit(signal)) if signal != "psi" else None
+        rare = signal in ("u", "v") or (signal == "speed" and one.unit not in PLAIN)
+        usual = written or ("m/s" if rare else one.unit)
+        if max(scores.get(name, 0.0) for name in names) < 0.45 and one.confidence > 0.5:
+            state.find("other name", (one.source,), one.confidence, f"{one.source!r} is {one.name}: {one.evidence}")
+        if one.unit != usual and written != "%":
+            says = f"its name says {written}" if written else "nothing says so"
+            state.find("other unit", (one.source,), one.confidence, f"{one.source!r} is in {one.unit}, and {says}")
+        if "sign" in one.extra and signal not in ("psi", "course", "north", "east", "latitude", "longitude"):
+            words = f"{one.source!r} counts the other way than {one.name}: {one.evidence}"
+            state.find("other sign", (one.source,), one.confidence, words)

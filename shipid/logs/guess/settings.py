@@ -75,7 +75,7 @@ class SearchSettings:
     least_part: float = 0.05
     two_left: float = 0.3
     two_left_of_turns: float = 0.75
-    steady: float = 0.3
+    steady: float = 0.25
 
 
 SETTINGS = SearchSettings()

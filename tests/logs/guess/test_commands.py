@@ -7,6 +7,7 @@ import pytest
 
 from shipid.logs.guess.clues import LIKELY, State
 from shipid.logs.guess.commands import choose_commands, likely_unit
+from shipid.logs.guess.motion import report_misnomers
 from tests.logs.simulated import si_log, state_with_pose
 
 LOG = si_log()
@@ -22,6 +23,7 @@ def chosen(columns: dict[str, np.ndarray], quiet: bool = False) -> State:
         assert state.psi is not None
         state.psi = state.r = 0.0 * state.psi
     choose_commands(state)
+    report_misnomers(state)
     return state
 
 
@@ -33,10 +35,10 @@ def described(state: State) -> dict[str, tuple[str, str, int]]:
     ("columns", "expected", "kinds"),
     [
         ({"rudder": RUDDER}, {"rudder.delta": ("rudder", "deg", 1)}, set()),
-        ({"rudder": -RUDDER}, {"rudder.delta": ("rudder", "deg", -1)}, {"wrong sign of rudder"}),
+        ({"rudder": -RUDDER}, {"rudder.delta": ("rudder", "deg", -1)}, {"other sign"}),
         ({"rudder": np.radians(RUDDER)}, {"rudder.delta": ("rudder", "rad", 1)}, set()),
         ({"azimuth": -RUDDER}, {"thruster.alpha": ("azimuth", "deg", 1)}, set()),
-        ({"azimuth": RUDDER}, {"thruster.alpha": ("azimuth", "deg", -1)}, {"wrong sign of rudder"}),
+        ({"azimuth": RUDDER}, {"thruster.alpha": ("azimuth", "deg", -1)}, {"other sign"}),
         ({"channel a": np.sin(T), "channel b": RUDDER}, {"rudder.delta": ("channel b", "deg", 1)}, set()),
     ],
     ids=["starboard", "port", "rad", "azimuth", "azimuth to starboard", "no name"],
@@ -118,7 +120,7 @@ def test_the_shaft_of_a_controllable_pitch_propeller_is_no_pitch() -> None:
         ("shaft speed", RPM, "rpm", False, set()),
         ("shaft speed", N, "rev/s", False, set()),
         ("shaft [rpm]", RPM, "rpm", False, set()),
-        ("shaft [rpm]", RPM / 60, "rev/s", False, {"unit of the shaft"}),
+        ("shaft [rpm]", RPM / 60, "rev/s", False, {"other unit"}),
         ("shaft speed [%]", RPM / 2.5, "rpm", True, set()),
         ("shaft speed", RPM / 2.5, "rpm", True, set()),
     ],
