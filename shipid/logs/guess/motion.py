@@ -160,16 +160,14 @@ def _ask_about_names(state: State, best: Motion) -> None:
 def _ask_about_rivals(state: State, motions: list[Motion]) -> None:
     """Ask where another column may be the heading nearly as well, and where a second heading differs from the first."""
     best, heading = motions[0], motions[0].pose.heading
-    course = best.velocity.second if best.velocity is not None and best.velocity.kind == "course" else ""
+    found = best.velocity
     others = [one for one in motions[1:] if one.pose.heading != heading and one.cost < best.cost + SETTINGS.close]
-    exchanged = course in state.all_called("psi") and heading not in state.all_called("psi")
-    if exchanged or (others and (state.numbered or others[0].pose.heading == course)):
-        other = course if exchanged else others[0].pose.heading
-        words = (
-            f"is {heading!r} the heading and {other!r} the course, or are they exchanged? The ship drifts out of its"
-        )
+    other = found.second if found is not None and found.kind == "course" and found.unsure else ""
+    other = others[0].pose.heading if others and state.numbered else other
+    if other:
+        words = f"is {heading!r} the heading and {other!r} the course, or are they exchanged? No ship drifts into its"
         about = ("psi", "north", "east", "u", "v", "r", "speed", "course")
-        state.ask(about, f"{words} turns with {heading!r} as heading: turns with a known current, or a gyro, tell")
+        state.ask(about, f"{words} turns; a run in a known current, or the column of a gyro, tells")
     named = [name for name in state.all_called("psi") if not is_order(name) and not is_magnetic(name)]
     named = [name for name in named if meaning_scores(name)["psi"] > meaning_scores(name).get("course", 0.0)]
     angles = {

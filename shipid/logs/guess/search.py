@@ -118,7 +118,6 @@ class Pose:
     sense: Sense
     misfit: float
     cost: float
-    undecided: bool = False
     astern: bool = False
 
     @property
@@ -132,7 +131,8 @@ class Velocity:
     """A hypothesis of velocities: `body`, `earth` or `course` (speed, and course in units of `turn`).
 
     side : 1 where the second counts along the second axis, or to the side to which that axis is. ground : (N,) in the
-    plane and the unit of the log. unsure : whether the track leaves the side open.
+    plane and the unit of the log. unsure : whether the track leaves the side
+    open, or the ship drifts into its turns along this course.
     """
 
     kind: str
@@ -275,19 +275,23 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
         for name, turn, cost, way in turned if size > 0 else ():
             if name in (place.first, place.second):
                 continue
-            both = [complex(np.sum(track * one)) / size for one in (np.conj(way), way)]
-            misfits = [1.0 - abs(one) for one in both]
+            ranked = _senses_of_angle(track, way)
             spread = 1.0 - abs(complex(np.mean(way)))
-            alike = max(misfits) < 2.0 * max(min(misfits), 1e-9) or spread < SETTINGS.spread
-            for sign, mean, misfit in zip((1, -1), both, misfits, strict=True):
-                if misfit > min(misfits) and not alike:
-                    continue
-                quarter = (round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1
-                across = SETTINGS.quarter * (sign > 0 and quarter != 0)
+            alike = ranked[1][0] < 2.0 * max(ranked[0][0], 1e-9) or spread < SETTINGS.spread
+            for misfit, sense in ranked if alike else ranked[:1]:
+                across = SETTINGS.quarter * (sense.sign > 0 and sense.quarter != 0)
                 share = (misfit + SETTINGS.floor + across) / (spread + SETTINGS.spread)
-                total = place.cost + cost + float(np.log(share))
-                poses.append(Pose(place, name, turn, Sense(sign, quarter), misfit, total, alike))
+                poses.append(Pose(place, name, turn, sense, misfit, place.cost + cost + float(np.log(share))))
     return sorted(poses, key=lambda one: one.cost)
+
+
+def _senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
+    """How an angle, exp(i angle) (W,), may count in the plane of a track (W,): misfit and sense, the better first."""
+    size = max(float(np.sum(np.abs(track))), 1e-12)
+    means = [(sign, complex(np.sum(track * one)) / size) for sign, one in ((1, np.conj(way)), (-1, way))]
+    quarters = [(round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1 for _, mean in means]
+    senses = [(1.0 - abs(mean), Sense(sign, one)) for (sign, mean), one in zip(means, quarters, strict=True)]
+    return sorted(senses, key=lambda one: one[0])
 
 
 def _turns_of_angle(state: State, name: str) -> Iterator[tuple[float, float]]:
@@ -298,14 +302,10 @@ def _turns_of_angle(state: State, name: str) -> Iterator[tuple[float, float]]:
     jumps = turn_of_jumps(values)
     for turn in (360.0, 2 * np.pi, *TURNS):
         usual = turn in (360.0, 2 * np.pi)
-        if jumps is not None:
-            cost = 0.0 if turn == jumps else SETTINGS.rare_unit + 1.0
-        elif written is not None:
-            cost = SETTINGS.rare_unit
-        else:
-            cost = SETTINGS.usual_unit * (turn != 360.0) if usual else SETTINGS.rare_unit
-        if written is not None and to_si(written, "psi") * turn == 2 * np.pi:
-            cost = 0.0
+        cost = SETTINGS.usual_unit * (turn != 360.0) if usual else SETTINGS.rare_unit
+        if jumps is not None or written is not None:
+            named = written is not None and to_si(written, "psi") * turn == 2 * np.pi
+            cost = 0.0 if named or turn == jumps else SETTINGS.rare_unit
         if usual or (jumps == turn) or (written is None and 360.5 < values.max() <= turn and values.min() >= 0.0):
             yield turn, cost
 
@@ -393,11 +393,10 @@ def _sense_cost(sense: Sense, compass: bool, plain: bool) -> float:
 
 def _axis_cost(name: str, way: str, sign: int) -> float:
     """What speaks against an axis with this name to that way."""
-    if _is_letter_axis(name) or name.isdecimal():
+    said = {other: meaning_scores(name).get(other, 0.0) for other in ("north", "east")}
+    if _is_letter_axis(name) or max(said.values()) <= 0.9:
         return 0.3 * (way != ("east" if "y" in name.lower() else "north")) + 0.3 * (sign < 0)
-    said = meaning_scores(name)
-    wrong = said.get(way, 0.0) < 0.6 < max(said.get(other, 0.0) for other in ("north", "east"))
-    return SETTINGS.axis / 2 * wrong + SETTINGS.turned_axis * (sign < 0)
+    return SETTINGS.axis / 2 * (said[way] < 0.6) + SETTINGS.turned_axis * (sign < 0)
 
 
 def _side_cost(state: State, name: str, sign: int) -> float:
@@ -410,16 +409,13 @@ def _side_cost(state: State, name: str, sign: int) -> float:
 
 def _course_axes(state: State, pose: Pose, seen: Complex) -> Iterator[tuple[str, Axes]]:
     """Yield columns of a course over ground, and the axes with which it counts clockwise from north."""
-    middle, size = (state.chosen.first + state.chosen.last) // 2, float(np.sum(np.abs(seen)))
+    middle = (state.chosen.first + state.chosen.last) // 2
     for name in _logged_courses(state, pose.heading):
         for turn, _ in _turns_of_angle(state, name):
             way = np.exp(1j * _angle(state, name, turn)[middle])
-            both = [complex(np.sum(seen * one)) / size for one in (np.conj(way), way)]
-            misfits = [1.0 - abs(one) for one in both]
-            if min(misfits) > SETTINGS.poor or max(misfits) < 2.0 * min(misfits) or abs(np.mean(way)) > 0.99:
+            (misfit, sense), (other, _) = _senses_of_angle(seen, way)
+            if misfit > SETTINGS.poor or other < 2.0 * misfit or abs(np.mean(way)) > 0.99:
                 continue
-            sign, mean = min(zip((1, -1), both, strict=True), key=lambda one: 1.0 - abs(one[1]))
-            sense = Sense(sign, (round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1)
             yield from ((name, axes) for axes in ALL_AXES[:5] if axes.sense(sense) == Sense())
             break
 
@@ -519,19 +515,17 @@ def _names_of_velocities(kind: str, first: str, second: str) -> float:
 def _speeds_and_courses(state: State, pose: Pose, seen: Complex, theta: Array) -> Iterator[Velocity]:
     used = {pose.place.first, pose.place.second, pose.heading}
     speeds = [name for name in state.called("speed") if name not in used]
-    courses = [name for name in [*state.called("course"), *state.called("psi")] if not is_order(name)]
+    courses = [name for name in state.called("course") if not is_order(name)]
     if state.numbered:
         speeds = courses = state.eligible()[:MOST_COLUMNS]
-    middle, size = (state.chosen.first + state.chosen.last) // 2, max(float(np.sum(np.abs(seen))), 1e-12)
+    middle = (state.chosen.first + state.chosen.last) // 2
     for name in dict.fromkeys(courses):
         for turn, more in _turns_of_angle(state, name) if name not in used else ():
             angle = _angle(state, name, turn)
             way = np.exp(1j * angle)
-            both = [complex(np.sum(seen * one[middle])) / size for one in (np.conj(way), way)]
-            sign, mean = max(zip((1, -1), both, strict=True), key=lambda one: abs(one[1]))
-            if abs(mean) < 1.0 - SETTINGS.unseen:
+            misfit, sense = _senses_of_angle(seen, way[middle])[0]
+            if misfit > SETTINGS.unseen:
                 continue
-            sense = Sense(sign, (round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1)
             plane = np.exp(1j * sense.direction(angle))
             for speed in speeds:
                 if speed == name:
@@ -544,8 +538,10 @@ def _speeds_and_courses(state: State, pose: Pose, seen: Complex, theta: Array) -
                     continue
                 if named >= 0.75 or _is_speed_unit(fit.scale):
                     cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + named)) + more + 0.5
-                    cost += -np.log(1.0 - SETTINGS.outward) * (_drift_in_turns(state, ground, theta) > 0.5)
-                    yield Velocity("course", speed, name, 1, fit, ground, named, float(cost), turn, sense)
+                    ahead = evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * theta))
+                    better = _positive_left(seen, state.chosen.change(ahead)) < 0.5 * fit.left
+                    inward = better and not pose.astern and _drift_in_turns(state, ground, theta) > 0.5
+                    yield Velocity("course", speed, name, 1, fit, ground, named, float(cost), turn, sense, inward)
 
 
 def _side_cost_of_sway(
