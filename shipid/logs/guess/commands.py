@@ -363,7 +363,7 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         _take_servo(state, steers, effects[steers].turn, used)
         steered = True
     drives = max((one for one in columns if one in state.free()), key=lambda name: effects[name].push, default="")
-    if drives and effects[drives].push > SETTINGS.seen:
+    if drives and (effects[drives].push > SETTINGS.seen or _are_pulses(state.columns[drives])):
         zero, why = _neutral_value(state, drives)
         words = f"{drives!r} drives the ship ahead. Of which shaft speed is a value of 1? Write factor, and offset"
         state.ask(("n",), f"{words} = -factor * {zero:g}; in which dead band about it does the screw stop?")

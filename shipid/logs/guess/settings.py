@@ -1,6 +1,6 @@
 """Every number that the search for the meaning of columns is tuned by, in one table with the reason for each.
 
-`python -m tests.benchmarks retune` tries others on logs drawn by seed.
+`python -m tests.benchmarks.retune` tries others on logs drawn by seed.
 """
 
 from __future__ import annotations

@@ -218,3 +218,17 @@ def test_a_unit_that_is_not_known_is_asked(name: str, values: np.ndarray, column
     assert [one.sentence.partition(":")[0] for one in state.questions if name in one.sentence] == [
         f"{name!r} says {name.partition('[')[2][:-1]!r}, no unit that is known here"
     ]
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("names", [("RCOU.C1", "RCOU.C3"), ("servo1_raw", "servo3_raw"), ("chan 1", "throttle_pct")])
+def test_pulses_are_drafted_by_what_the_ship_does_after_them(names: tuple[str, str], sense: int) -> None:
+    """1500 us is amidships; the angle of the largest pulse is asked, and so is the shaft speed of a throttle."""
+    state = chosen({names[0]: 1500.0 + sense * 400.0 / 45.0 * RUDDER, names[1]: 1500.0 + 2.0 * RPM})
+    assert described(state)["rudder.delta"] == (names[0], "deg", sense)
+    (angle,) = (one for one in state.suggestions if one.name == "rudder.delta")
+    assert angle.confidence < LIKELY
+    assert angle.extra["factor"] * 400.0 == pytest.approx(45.0)
+    assert angle.extra["offset"] == pytest.approx(-sense * 1500.0 * 45.0 / 400.0)
+    assert described(state)["propeller.n"][0] == names[1]
+    assert any("dead band" in one.sentence for one in state.questions)
