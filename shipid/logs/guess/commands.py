@@ -259,45 +259,42 @@ def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict
 def _unit_of_shaft(
     state: State, name: str, written: str | None, top: float, tunnel: bool
 ) -> tuple[str, float, str, dict[str, Any]]:
-    """Unit, confidence, reason and further keys of a shaft speed, by the way of the ship in one turn."""
+    """Unit, confidence, reason and further keys of a shaft speed, by its name and the way of the ship in one turn."""
     begins, about = f"{name!r}, up to {top:.4g}", ("n",)
-    if is_electrical(name):
-        remedy = "Write factor = 2 / poles; a gear divides it further"
-        state.ask(about, f"{begins}, is the electrical speed of a motor: of how many poles? {remedy}")
-        return "rpm", 0.3, " electrical rpm, of a number of poles that the log does not say", {"factor": 1.0}
-    if written == "%":
-        state.ask(about, f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100")
-        return "rpm", 0.3, " per cent of a shaft speed that the log does not say", {"factor": 1.0}
-    off = {unit: _off_advance(state, state.columns[name], unit) for unit in ("rpm", "rev/s", "rad/s")}
-    likely = min(("rpm", "rev/s"), key=off.__getitem__)
-    if written is not None and not tunnel:
-        far = off.get(written, 1.0)
-        if written != likely and far > SETTINGS.near > 3 * off[likely]:
-            return likely, 0.6, f"; the way in a turn of the shaft is {far:.0f} times off in {written}", {}
-        if written != "rad/s" and top * to_si(written, "propeller.n") > GEARED and is_engine(name):
-            words = f"{begins} {written}, is the speed of an engine: is there a gear?"
-            state.ask(about, f"{words} Write factor = 1 / its ratio")
+    if is_electrical(name) or written == "%":
+        electrical = f"{begins}, is the electrical speed of a motor: of how many poles? Write factor = 2 / poles"
+        share = f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100"
+        state.ask(about, electrical if is_electrical(name) else share)
+        return "rpm", 0.3, " of what the log does not say", {"factor": 1.0}
+    in_radians = any(one.name == "psi" and one.unit == "rad" for one in state.suggestions)
+    prior = {"rpm": 0.0, "rev/s": 0.0, "rad/s": 1.0 if in_radians else SETTINGS.turned_axis}
+    off = {unit: np.log(_off_advance(state, state.columns[name], unit)) ** 2 for unit in prior}
+    cost = {
+        unit: prior[unit] + one + 2 * SETTINGS.turned_axis * (written not in (None, unit)) for unit, one in off.items()
+    }
+    unit = min(cost, key=cost.__getitem__)
     if written is not None:
-        return written, 0.9, "", {}
-    if tunnel:
-        units = [one.unit for one in state.suggestions if one.name.endswith(".n")]
-        unit = units[0] if units else likely_unit(state, name, "n")
+        unit = written if tunnel or not np.isfinite(cost[unit]) else unit
+        if unit == written != "rad/s" and top * to_si(unit, "propeller.n") > GEARED and is_engine(name):
+            words = f"{begins} {unit}, is the speed of an engine: is there a gear? Write factor = 1 / its ratio"
+            state.ask(about, words)
+        return (
+            (unit, 0.9, "", {}) if unit == written else (unit, 0.6, f"; as the way in a turn says, not {written}", {})
+        )
+    if state.ask_for_unit("n", name, unit):
+        return unit, 0.3, " in a unit that is not known", {}
+    shafts = [one.unit for one in state.suggestions if one.name.endswith(".n")]
+    if tunnel or not off[unit] < SETTINGS.near:
+        unit = shafts[0] if tunnel and shafts else likely_unit(state, name, "n")
         state.ask(about, f"in which unit is {begins}? The way of the ship does not say: {unit} is a guess")
-        return unit, 0.4, f"; in {unit} as the other shafts" * bool(units), {}
-    if state.ask_for_unit("n", name, likely):
-        return likely, 0.3, " in a unit that is not known", {}
-    known = off[likely] < SETTINGS.near
-    if not known:
-        likely = likely_unit(state, name, "n")
-        state.ask(about, f"in which unit is {begins}? {likely} is a guess")
-        return likely, 0.4, "", {}
-    if top <= 130.0 and (likely == "rpm" or top > 50.0):
-        state.ask(about, f"{begins}, has no unit: {likely}, or per cent of a shaft speed?")
-    angles = next((one.unit for one in state.suggestions if one.name == "psi"), "")
-    if likely == "rev/s" and angles == "rad" and off["rad/s"] < SETTINGS.near:
-        state.ask(about, f"{begins}, has no unit: rev/s, or rad/s, as angles are in rad here?")
-        return likely, 0.5, "; the way in a turn of the shaft says rev/s or rad/s", {}
-    return likely, 0.7, f"; the way in a turn of the shaft says {likely}", {}
+        return unit, 0.4, f"; in {unit} as the other shafts" * bool(tunnel and shafts), {}
+    rivals = [one for one in cost if one != unit and cost[one] < cost[unit] + SETTINGS.turned_axis * in_radians]
+    rivals += ["per cent of a shaft speed"] * (top <= 130.0 and (unit == "rpm" or top > 50.0))
+    if rivals:
+        why = ", as angles are in rad here" * ("rad/s" in rivals)
+        state.ask(about, f"{begins}, has no unit: {unit}, or {', or '.join(rivals)}{why}?")
+    why = f"; the way in a turn of the shaft says {' or '.join([unit, *rivals])}"
+    return unit, 0.5 if "rad/s" in rivals else 0.7, why, {}
 
 
 def _off_advance(state: State, values: Array, unit: str) -> float:
@@ -358,6 +355,7 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     if pair is not None and abs(turning[pair]) >= SETTINGS.seen:
         _take_twins(state, pair, turning[pair])
         return True
+    columns = [name for name in columns if _says_actuator(state, name)]
     steers = max(columns, key=lambda name: abs(effects[name].turn), default="")
     if steers and not steered and abs(effects[steers].turn) > SETTINGS.seen:
         _take_servo(state, steers, effects[steers].turn, used)
@@ -452,11 +450,15 @@ def twin_columns(state: State) -> list[tuple[str, str]]:
     ]
 
 
-def _may_be_actuator(state: State, name: str) -> bool:
-    """Whether a name says an order, a throttle or per cent, or nothing at all; and no unit of another quantity."""
+def _says_actuator(state: State, name: str) -> bool:
+    """Whether a name says an order, a throttle or per cent, or its numbers are pulses."""
     said = is_order(name) or bool(OF_ACTUATORS & {*name_parts(name)}) or unit_in_name(name, "rev/s") == "%"
-    said = said or _are_pulses(state.columns[name])
-    fit = meaning_scores(name)
+    return said or _are_pulses(state.columns[name])
+
+
+def _may_be_actuator(state: State, name: str) -> bool:
+    """Whether a name says an actuator or nothing at all, and no unit of another quantity."""
+    fit, said = meaning_scores(name), _says_actuator(state, name)
     foreign = unit_of_another(name, "n") is not None or (fit.get("", 0.0) >= STRONG and not said)
     return not foreign and (said or not fit)
 

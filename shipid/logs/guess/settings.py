@@ -35,8 +35,8 @@ class SearchSettings:
     followed : correlation of the yaw rate with an earlier order from which its sign is taken, else.
     astern : share of the turning shaft's rows in which it turns astern, of a ship that goes astern all the time.
     turned : range of a heading that no name says [rad], at least.
-    advance, near : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05), and how many
-        times a unit may be off that before it is doubted.
+    advance, near : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05), and the
+        square of the logarithm of how many times a unit may be off that before it is doubted: 15 times.
     alike : ratio of two scales that are one.
     least_part : share of all motion that a part with another unit has.
     two_left, two_left_of_turns : share of what one scale leaves that two leave, at most; of what turns the ship.
@@ -70,7 +70,7 @@ class SearchSettings:
     astern: float = 0.9
     turned: float = 0.14
     advance: float = 0.01
-    near: float = 15.0
+    near: float = 7.3
     alike: float = 1.4
     least_part: float = 0.05
     two_left: float = 0.3
