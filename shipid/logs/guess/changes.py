@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.defects import clock_text
 from shipid.logs.guess.evidence import Complex
+from shipid.logs.guess.search import senses_of_angle
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of
@@ -57,6 +59,36 @@ def ask_for_changes(state: State) -> None:
         remedy = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
         state.changed |= {*one.about}
         state.ask(one.about, f"{words}. {remedy}")
+
+
+def ask_about_files(state: State, pause: float) -> None:
+    """Ask where a file has another frame, heading or sense of an angle than the others; `pause` [s] parts the files."""
+    edges = [0, *(1 + np.flatnonzero(np.diff(state.t) > 0.5 * pause)), len(state.t)]
+    middle, track = (state.chosen.first + state.chosen.last) // 2, state.chosen.change(state.position)
+    psi = next(one.source for one in state.suggestions if one.name == "psi")
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
+    for number, (first, end) in enumerate(pairwise(edges), 1):
+        inside, place = (middle >= first) & (middle < end), f"in file {number} of {len(edges) - 1}"
+        if not state.joined or len(edges) < 3 or inside.sum() < 20:
+            continue
+        (misfit, sense), (other, _) = senses_of_angle(track[inside], np.exp(1j * state.psi[middle[inside]]))
+        odd = sense.quarter != 0 or (sense.sign < 0 and other > 2.0 * misfit)
+        if odd and misfit < SETTINGS.poor and not state.astern:
+            words = (
+                f"{place} the track does not keep to {psi!r} as in the others: are its axes, or its heading, others?"
+            )
+            state.ask(
+                ("psi", "north", "east", "latitude", "longitude"), f"{words} Then leave it out, and import it alone"
+            )
+        for source, sign in state.turning.items():
+            rows = slice(first, end)
+            signals = state.t[rows], r[rows], state.columns[source][rows]
+            effect = evidence.order_effect(*signals, state.part) / SETTINGS.seen
+            follows = evidence.order_correlation(*signals, 2 * state.part) / SETTINGS.followed
+            if sign * effect < -2 or (abs(effect) < 1 and sign * follows < -2):
+                names = tuple(one.name for one in state.suggestions if one.source == source)
+                words = f"{place} {source!r} turns the ship to the other side than in the others: has it another sign?"
+                state.ask(names, f"{words} Then import it alone")
 
 
 def _relations(state: State) -> Iterator[Relation]:

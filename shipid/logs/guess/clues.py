@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.amounts import UNIT_WORDS, is_known, north_reference, without_prefix
-from shipid.logs.guess.evidence import Complex, RowWindows, heal_angle, order_effect
+from shipid.logs.guess.evidence import Complex, RowWindows, order_effect
 from shipid.logs.guess.words import (
     how_much_says,
     is_note,
@@ -24,7 +24,7 @@ from shipid.logs.guess.words import (
     side_in_name,
     units_in_name,
 )
-from shipid.logs.mapping import UNITS, to_si
+from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS, is_steering, signal_of
 
@@ -202,11 +202,6 @@ class State:
     r: Array | None = None
     velocity: Complex | None = None
     body: Complex | None = None
-
-    def angle(self, name: str, unit: str) -> Array:
-        """Angle [rad], (N,), of a column in this unit, unwrapped and without false samples."""
-        size = to_si(unit, "psi")
-        return size * heal_angle(self.columns[name], 2 * np.pi / size, self.t)[0]
 
     def effect(self, r: Array, order: Array) -> float:
         """The t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""

@@ -16,7 +16,7 @@ from shipid.arguments import as_names, as_path, check_choice, check_class
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
-from shipid.logs.guess.changes import ask_for_changes
+from shipid.logs.guess.changes import ask_about_files, ask_for_changes
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Clue, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
@@ -34,7 +34,7 @@ from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.search import Frame
 from shipid.logs.guess.sniff import LogTable
-from shipid.logs.guess.sources import GuessFiles, read_source
+from shipid.logs.guess.sources import PAUSE, GuessFiles, read_source
 from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import unused_reasons
 from shipid.logs.guess.wind import choose_wind
@@ -144,6 +144,7 @@ def guess(
     report_command_faults(state, sniffed)
     defects_of_spikes(state)
     ask_for_changes(state)
+    ask_about_files(state, PAUSE)
     defects_of_motion(state)
     left = unused_reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)

@@ -21,6 +21,7 @@ from shipid.logs.guess.search import (
     Motion,
     Sense,
     Velocity,
+    length_unit,
     local_plane,
     rates_of_ais,
     search_motion,
@@ -64,13 +65,12 @@ def _take_pose(state: State, best: Motion) -> None:
     for source, sign in zip(sources, (axes.north, axes.east), strict=True):
         if sign < 0:
             state.negate(source)
-    units = {unit_in_name(name, "m") for name in sources}
-    length = "deg" if place.on_globe else (units.pop() if len(units) == 1 else None) or "m"
+    length = "deg" if place.on_globe else length_unit(*sources)
     sure = 0.99 * (1.0 - min(0.5, pose.misfit))
     why = f"course over ground keeps to the heading (agreement {1.0 - pose.misfit:.3f} of 1)"
     for name, source in zip(("latitude", "longitude") if place.on_globe else ("north", "east"), sources, strict=True):
         state.suggest(name, source, length, sure, why)
-    state.position = plane * (1.0 if place.on_globe else to_si(length, "north"))
+    state.position = plane
     _report_axes(state, best, sources, sense)
     named = meaning_scores(pose.heading)
     if not state.numbered and named.get("psi", 0.0) <= named.get("course", 0.0):
@@ -261,12 +261,9 @@ def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool
     if costs[ranked[0]] > 20.0:  # a factor of no unit
         return written or ("kn" if name in state.scaled else "m/s"), 1.0
     rivals = [one for one in ranked[1:] if costs[one] <= costs[ranked[0]] + SETTINGS.close and one[2] != clock]
-    if clock != state.clock_unit or rivals:
-        unit, part, other = ranked[0] if clock != state.clock_unit else rivals[0]
-        words = f"is the clock in {other}, with {name!r} in {unit}? The draft says {state.clock_unit}"
+    for other_unit, _, other in [ranked[0]] if clock != state.clock_unit else rivals[:1]:
+        words = f"is the clock in {other}, with {name!r} in {other_unit}? The draft says {state.clock_unit}"
         state.ask(("t", "u", "v", "speed"), f"{words}: the track is {fit.scale:.4g} times the integral of {name!r}")
-        state.find("clock unit", sources, 0.6, f"a clock in {other} would explain the track") if not rivals else None
-        unit, part = ranked[0][:2] if rivals else (unit, part)
     return unit, part
 
 

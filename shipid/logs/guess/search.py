@@ -155,7 +155,6 @@ class Rate:
     name: str
     unit: str
     fit: Fit
-    off: float
     cost: float
 
 
@@ -275,7 +274,7 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
         for name, turn, cost, way in turned if size > 0 else ():
             if name in (place.first, place.second):
                 continue
-            ranked = _senses_of_angle(track, way)
+            ranked = senses_of_angle(track, way)
             spread = 1.0 - abs(complex(np.mean(way)))
             alike = ranked[1][0] < 2.0 * max(ranked[0][0], 1e-9) or spread < SETTINGS.spread
             for misfit, sense in ranked if alike else ranked[:1]:
@@ -285,7 +284,7 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
     return sorted(poses, key=lambda one: one.cost)
 
 
-def _senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
+def senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     """How an angle, exp(i angle) (W,), may count in the plane of a track (W,): misfit and sense, the better first."""
     size = max(float(np.sum(np.abs(track))), 1e-12)
     means = [(sign, complex(np.sum(track * one)) / size) for sign, one in ((1, np.conj(way)), (-1, way))]
@@ -413,7 +412,7 @@ def _course_axes(state: State, pose: Pose, seen: Complex) -> Iterator[tuple[str,
     for name in _logged_courses(state, pose.heading):
         for turn, _ in _turns_of_angle(state, name):
             way = np.exp(1j * _angle(state, name, turn)[middle])
-            (misfit, sense), (other, _) = _senses_of_angle(seen, way)
+            (misfit, sense), (other, _) = senses_of_angle(seen, way)
             if misfit > SETTINGS.poor or other < 2.0 * misfit or abs(np.mean(way)) > 0.99:
                 continue
             yield from ((name, axes) for axes in ALL_AXES[:5] if axes.sense(sense) == Sense())
@@ -523,7 +522,7 @@ def _speeds_and_courses(state: State, pose: Pose, seen: Complex, theta: Array) -
         for turn, more in _turns_of_angle(state, name) if name not in used else ():
             angle = _angle(state, name, turn)
             way = np.exp(1j * angle)
-            misfit, sense = _senses_of_angle(seen, way[middle])[0]
+            misfit, sense = senses_of_angle(seen, way[middle])[0]
             if misfit > SETTINGS.unseen:
                 continue
             plane = np.exp(1j * sense.direction(angle))
@@ -610,7 +609,7 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
             limit = SETTINGS.named_left if score else SETTINGS.misled if command or is_order(name) else 0.3
             if fit.left < limit and off < (0.35 if score else SETTINGS.misled if name in others else 0.35):
                 cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off
-                yield Rate(name, unit, fit, off, float(cost))
+                yield Rate(name, unit, fit, float(cost))
 
 
 def rates_of_ais(state: State, name: str) -> Array | None:
@@ -627,10 +626,10 @@ def rates_of_ais(state: State, name: str) -> Array | None:
 
 
 def local_plane(state: State, first: str, second: str, on_globe: bool) -> Complex:
-    """A position as first + i second, or as north + i east [m] in the plane that touches the Earth at its first."""
+    """A position as first + i second [m], or as north + i east in the plane that touches the Earth at its first."""
     a, b = state.columns[first], state.columns[second]
     if not on_globe:
-        return np.asarray(a + 1j * b)
+        return np.asarray(to_si(length_unit(first, second), "north") * (a + 1j * b))
     origin = float(a[0]), float(b[0])
     turn = np.unwrap(meridian_convergence(a, b, *origin))
     a, b, _ = geodetic2ned(a, b, 0.0, origin[0], origin[1], 0.0)
@@ -638,6 +637,12 @@ def local_plane(state: State, first: str, second: str, on_globe: bool) -> Comple
     if np.max(np.abs(turn)) <= PARALLEL:
         return place
     return np.append(0.0, np.cumsum(np.diff(place) * np.exp(-0.5j * (turn[1:] + turn[:-1]))))
+
+
+def length_unit(first: str, second: str) -> str:
+    """The unit of length that both names say, else metres."""
+    units = {unit_in_name(name, "m") or "m" for name in (first, second)}
+    return units.pop() if len(units) == 1 else "m"
 
 
 def _within_globe(state: State, north: str, east: str) -> bool:
