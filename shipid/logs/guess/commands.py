@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -42,14 +41,6 @@ OF_ACTUATORS = frozenset(
     "chan channel out us raw".split()
 )
 """Words that say an order of an actuator, and not of which kind."""
-
-
-@dataclass(frozen=True)
-class Effect:
-    """What a column does to the ship: t values of its effect on the yaw rate, to starboard, and on the speed ahead."""
-
-    turn: float
-    push: float
 
 
 def choose_commands(state: State) -> None:
@@ -338,16 +329,14 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     speed = np.real(np.gradient(state.position, state.t) * middle)
     columns = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and _may_be_actuator(state, name)]
     twins = [pair for pair in twin_columns(state) if {*pair} <= {*columns}]
-    effects = {
-        name: Effect(state.effect(r, state.columns[name]), state.effect(speed, state.columns[name])) for name in columns
-    }
+    turn = {name: state.effect(r, state.columns[name]) for name in columns}
+    push = {name: state.effect(speed, state.columns[name]) for name in columns}
     if not twins:
         twins = [
-            (one, other) if effects[one].turn > 0 else (other, one)
+            (one, other) if turn[one] > 0 else (other, one)
             for one, other in combinations(columns, 2)
-            if effects[one].turn * effects[other].turn < 0.0
-            and min(abs(effects[name].turn) for name in (one, other)) > SETTINGS.seen
-            and min(effects[name].push for name in (one, other)) > SETTINGS.seen
+            if turn[one] * turn[other] < 0.0
+            and min(abs(turn[one]), abs(turn[other]), push[one], push[other]) > SETTINGS.seen
             and not {state.side_of(one), state.side_of(other)} & {"port", "starboard"}
         ]
     turning = {pair: state.effect(r, state.columns[pair[0]] - state.columns[pair[1]]) for pair in twins}
@@ -356,17 +345,17 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         _take_twins(state, pair, turning[pair])
         return True
     columns = [name for name in columns if _says_actuator(state, name)]
-    steers = max(columns, key=lambda name: abs(effects[name].turn), default="")
-    if steers and not steered and abs(effects[steers].turn) > SETTINGS.seen:
-        _take_servo(state, steers, effects[steers].turn, used)
+    steers = max(columns, key=lambda name: abs(turn[name]), default="")
+    if steers and not steered and abs(turn[steers]) > SETTINGS.seen:
+        _take_servo(state, steers, turn[steers], used)
         steered = True
-    drives = max((one for one in columns if one in state.free()), key=lambda name: effects[name].push, default="")
-    if drives and (effects[drives].push > SETTINGS.seen or _are_pulses(state.columns[drives])):
+    drives = max((one for one in columns if one in state.free()), key=push.__getitem__, default="")
+    if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
         zero, why = _neutral_value(state, drives)
         words = f"{drives!r} drives the ship ahead. Of which shaft speed is a value of 1? Write factor, and offset"
         state.ask(("n",), f"{words} = -factor * {zero:g}; in which dead band about it does the screw stop?")
         extra = {"factor": 1.0} | ({"offset": -zero} if zero else {})
-        why = f"it drives the ship ahead (t value {effects[drives].push:.0f}){why}"
+        why = f"it drives the ship ahead (t value {push[drives]:.0f}){why}"
         state.suggest(_command_of_column(state, drives, "propeller.n", used), drives, "rpm", 0.5, why, **extra)
     return steered
 

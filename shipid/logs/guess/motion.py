@@ -118,10 +118,11 @@ def _report_axes(state: State, best: Motion, sources: tuple[str, str], sense: Se
         state.ask(
             ("latitude", "longitude", "psi"), f"does the log count {said}? Else {pose.heading!r} counts otherwise"
         )
-    elif best.rival is not None:
-        sides = "; port and starboard change places" * (axes.hand != best.rival.hand)
-        said = f"is {words}, or {_reading_in_words(best, best.rival)}? Motion is the same in both{sides}"
-        state.ask(("psi", "north", "east"), f"{said}: answer with --frame ned, enu, zup or ros")
+    elif best.rivals:
+        sides = "; port and starboard change places" * any(axes.hand != one.hand for one in best.rivals)
+        said = ", or ".join([f"is {words}", *(_reading_in_words(best, one) for one in best.rivals)])
+        words = f"{said}? Motion is the same in all{sides}: answer with --frame ned, enu, zup or ros"
+        state.ask(("psi", "north", "east"), words)
 
 
 def _ways(axes: Axes) -> list[str]:

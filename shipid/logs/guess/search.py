@@ -160,7 +160,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Motion:
-    """A hypothesis of the whole motion, with where its axes point and the next best of these."""
+    """A hypothesis of the whole motion, with where its axes point, and where nearly as likely."""
 
     pose: Pose
     velocity: Velocity | None
@@ -168,7 +168,7 @@ class Motion:
     axes: Axes
     cost: float
     settled: str = ""
-    rival: Axes | None = None
+    rivals: tuple[Axes, ...] = ()
 
 
 # --- hypotheses ---
@@ -339,8 +339,8 @@ def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> Motion | Non
         return None
     (cost, axes, settled), *others = readings
     total = pose.cost + cost + sum(one.cost for one in (velocity, rate) if one is not None and one.cost < 0.0)
-    rival = others[0][1] if others and others[0][0] < cost + SETTINGS.close else None
-    return Motion(pose, velocity, rate, axes, total, settled, rival)
+    rivals = tuple(other for more, other, _ in others if more < cost + SETTINGS.close)
+    return Motion(pose, velocity, rate, axes, total, settled, rivals)
 
 
 # --- where the axes point ---
@@ -359,7 +359,7 @@ def _readings(state: State, pose: Pose, seen: Complex, frame: str | None) -> Ite
         meaning_scores(name).get(way, 0.0) > 0.9 for name, way in ((place.first, "north"), (place.second, "east"))
     )
     for axes in ALL_AXES:
-        cost = _sense_cost(axes.sense(pose.sense), compass, plain)
+        cost = _sense_cost(axes.sense(pose.sense), compass, plain and pose.sense == Sense())
         if pose.misfit > SETTINGS.unseen and not state.numbered:  # the track says nothing
             cost = 0.0
         first, second = ("east", "north") if axes.swap else ("north", "east")
@@ -379,15 +379,12 @@ def _readings(state: State, pose: Pose, seen: Complex, frame: str | None) -> Ite
         yield cost, axes, told
 
 
-def _sense_cost(sense: Sense, compass: bool, plain: bool) -> float:
-    """What speaks against a heading that counts so, clockwise from north being the usual way."""
+def _sense_cost(sense: Sense, compass: bool, local: bool) -> float:
+    """What speaks against a heading that counts so; local : from the first axis to the second, of any hand."""
     if sense == Sense():
         return 0.0
-    if sense == Sense(-1) and plain:
-        return 0.7
-    if compass:
-        return SETTINGS.compass
-    return 0.7 if sense in (Sense(-1, 1), Sense(-1)) else SETTINGS.axis
+    usual = sense in (Sense(-1, 1), Sense(-1))
+    return 0.7 if usual and (local or not compass) else SETTINGS.compass if compass else SETTINGS.axis
 
 
 def _axis_cost(name: str, way: str, sign: int) -> float:
