@@ -333,10 +333,12 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     push = {name: state.effect(speed, state.columns[name]) for name in columns}
     if not twins:
         twins = [
-            (one, other) if turn[one] > 0 else (other, one)
+            (one, other) if both[0] > 0 else (other, one)
             for one, other in combinations(columns, 2)
-            if turn[one] * turn[other] < 0.0
-            and min(abs(turn[one]), abs(turn[other]), push[one], push[other]) > SETTINGS.seen
+            for both in [state.effects(r, np.stack([state.columns[one], state.columns[other]]))]
+            if both[0] * both[1] < 0.0
+            and np.abs(both).min() > SETTINGS.seen
+            and state.effect(speed, state.columns[one] + state.columns[other]) > SETTINGS.seen / 2
             and not {state.side_of(one), state.side_of(other)} & {"port", "starboard"}
         ]
     turning = {pair: state.effect(r, state.columns[pair[0]] - state.columns[pair[1]]) for pair in twins}

@@ -150,25 +150,36 @@ def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> flo
 
     t, r, order : (N,), r [rad/s]. duration : of the windows [s].
     """
-    rows, design, change = yaw_regression(t, r, order, duration)
-    if len(rows) < 12 or np.ptp(order) == 0.0:
-        return 0.0
+    return float(order_effects(t, r, order[None], duration)[0])
+
+
+def order_effects(t: Array, r: Array, orders: Array, duration: float = 4.0) -> Array:
+    """The t values (K,) of the effects of several orders (K, N) at once, as of `order_effect`."""
+    count = len(orders)
+    rows, design, change = yaw_regression(t, r, orders, duration)
+    if len(rows) < 12 or np.any(np.ptp(orders, axis=1) == 0.0):
+        return np.zeros(count)
     solution, errors, _ = solve_least_squares(design, change)
-    return float(solution[0] / errors[0]) if 0.0 < errors[0] < np.inf else 0.0
+    seen = (errors > 0.0) & np.isfinite(errors)
+    return np.where(seen, solution / np.where(seen, errors, 1.0), 0.0)[:count]
 
 
 def yaw_regression(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
-    """First rows (W,), columns (W, 3), left side (W,) of r' = a order + b r + c over windows without jumps of r."""
+    """First rows (W,), columns (W, K + 2), left side (W,) of r' = a order + b r + c over windows without jumps of r.
+
+    order : (N,), or several (K, N).
+    """
     chosen = row_windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = RowWindows(chosen.first[::thin], chosen.last[::thin])
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
-    signals, stretch = (cumulative_integral(t, order), cumulative_integral(t, r), t, r), _stretch_numbers(t)
+    orders = [cumulative_integral(t, one) for one in np.atleast_2d(order)]
+    signals, stretch = (*orders, cumulative_integral(t, r), t, r), _stretch_numbers(t)
     smooth = [_moving_mean(x, width, stretch) for x in signals]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
     design = np.stack(columns, axis=1)
     wild = np.zeros(len(change), dtype=bool)
-    for one in (change, design[:, 1]) if len(change) else ():
+    for one in (change, design[:, -2]) if len(change) else ():
         wild |= np.abs(one) > WILD * np.percentile(np.abs(one), 95)
     tame = ~wild | (np.sum(wild) > RARE * len(wild))
     return chosen.first[tame], design[tame], change[tame]
