@@ -66,7 +66,7 @@ def _take_pose(state: State, best: Motion) -> None:
         if sign < 0:
             state.negate(source)
     length = "deg" if place.on_globe else length_unit(*sources)
-    sure = 0.99 * (1.0 - min(0.5, pose.misfit))
+    sure = 0.99 * (1.0 - min(0.5, 5.0 * pose.misfit**2))
     why = f"course over ground keeps to the heading (agreement {1.0 - pose.misfit:.3f} of 1)"
     for name, source in zip(("latitude", "longitude") if place.on_globe else ("north", "east"), sources, strict=True):
         state.suggest(name, source, length, sure, why)
@@ -199,8 +199,8 @@ def _take_velocities(state: State, best: Motion, found: Velocity) -> None:
     confidence = 0.99 * (1 - min(0.5, fit.left))
     leaves = f"leaves {100 * fit.left:.2g} % of the track unexplained"
     if found.kind == "course":
-        why = f"along the course it {leaves}"
         turned = "rad" if found.turn < 7.0 else "deg"
+        why = f"along the course [{turned}] it {leaves}"
         if found.turn in TURNS:
             set_scale(state, second, 360.0 / found.turn, f"a whole turn is {found.turn:g}: {TURNS[found.turn]}")
         sense = axes.sense(found.sense)
