@@ -325,16 +325,16 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     Two that turn the ship against each other are screws of two sides, one that turns it a rudder, one that drives it
     a screw.
     """
-    middle = np.exp(-1j * state.psi)
-    speed = np.real(np.gradient(state.position, state.t) * middle)
+    speed = np.real(np.gradient(state.position, state.t) * np.exp(-1j * state.psi))
     columns = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and _may_be_actuator(state, name)]
     twins = [pair for pair in twin_columns(state) if {*pair} <= {*columns}]
     turn = {name: state.effect(r, state.columns[name]) for name in columns}
     push = {name: state.effect(speed, state.columns[name]) for name in columns}
+    sure = [name for name in columns if _says_actuator(state, name)]
     if not twins:
         twins = [
             (one, other) if both[0] > 0 else (other, one)
-            for one, other in combinations(columns, 2)
+            for one, other in combinations(sure, 2)
             for both in [state.effects(r, np.stack([state.columns[one], state.columns[other]]))]
             if both[0] * both[1] < 0.0
             and np.abs(both).min() > SETTINGS.seen
@@ -346,12 +346,11 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     if pair is not None and abs(turning[pair]) >= SETTINGS.seen:
         _take_twins(state, pair, turning[pair])
         return True
-    columns = [name for name in columns if _says_actuator(state, name)]
-    steers = max(columns, key=lambda name: abs(turn[name]), default="")
+    steers = max(sure, key=lambda name: abs(turn[name]), default="")
     if steers and not steered and abs(turn[steers]) > SETTINGS.seen:
         _take_servo(state, steers, turn[steers], used)
         steered = True
-    drives = max((one for one in columns if one in state.free()), key=push.__getitem__, default="")
+    drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
     if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
         zero, why = _neutral_value(state, drives)
         words = f"{drives!r} drives the ship ahead. Of which shaft speed is a value of 1? Write factor, and offset"

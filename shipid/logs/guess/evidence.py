@@ -361,7 +361,7 @@ def _fill_column(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
-    """The length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
+    """The length of windows [s] for this ship: about a radian of its usual turning, `WINDOW` at most.
 
     t (N,) [s], psi (N,) [rad].
     """

@@ -269,7 +269,7 @@ def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool
 
 
 def _report_factor(state: State, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...]) -> None:
-    """Report a factor that remains beside the unit, and one that an other conversion from knots has left."""
+    """Report a factor of the speeds that remains beside their unit."""
     pair = " and ".join(repr(source) for source in sources)
     begins = f"the track is {fit.scale:.4g} times the integral of {pair} in {unit}"
     if not 1 / FAR <= fit.scale <= FAR:
