@@ -208,3 +208,21 @@ def test_a_ship_that_goes_astern_all_the_time_keeps_her_heading(
     assert not state.negated
     assert [one.sentence for one in state.findings if one.kind == "astern" and why in one.sentence]
     assert not [one for one in state.questions if "psi" in one.about]
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "yaw", "reading"),
+    [
+        (NORTH, EAST, DEG, "'x' to north, 'y' to east, '{}' counted to starboard from north"),
+        (NORTH, -EAST, -DEG, "'x' to north, 'y' to west, '{}' counted to port from north"),
+        (EAST, NORTH, 90.0 - DEG, "'x' to east, 'y' to north, '{}' counted to port from east"),
+    ],
+    ids=["ned", "zup", "ros"],
+)
+@pytest.mark.parametrize("name", ["yaw", "heading", "theta"])
+def test_the_true_frame_is_among_those_that_are_asked(
+    x: np.ndarray, y: np.ndarray, yaw: np.ndarray, reading: str, name: str
+) -> None:
+    """The motion is the same in all of them, in which port and starboard change places."""
+    (question,) = chosen({"x": x, "y": y, name: yaw % 360.0}).questions
+    assert reading.format(name) in question.sentence
