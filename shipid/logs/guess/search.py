@@ -332,8 +332,14 @@ def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> Motion | Non
     plane = local_plane(state, place.first, place.second, place.on_globe)
     theta = _plane_heading(state, pose)
     seen = state.chosen.change(plane)
-    velocity = min(_velocity_hypotheses(state, pose, seen, theta), key=lambda one: one.cost, default=None)
-    rate = min(_rate_hypotheses(state, pose, theta), key=lambda one: one.cost, default=None)
+    velocities = sorted(_velocity_hypotheses(state, pose, seen, theta), key=lambda one: one.cost)[:4]
+    rates = sorted(_rate_hypotheses(state, pose, theta), key=lambda one: one.cost)[:4]
+    pairs = [
+        (velocity, rate)
+        for velocity, rate in product([*velocities, None], [*rates, None])
+        if velocity is None or rate is None or rate.name not in (velocity.first, velocity.second)
+    ]
+    velocity, rate = min(pairs, key=lambda pair: sum(one.cost if one else SETTINGS.none for one in pair))
     readings = sorted(_readings(state, pose, seen, frame), key=lambda one: one[0])
     if not readings:
         return None

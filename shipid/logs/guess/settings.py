@@ -22,6 +22,7 @@ class SearchSettings:
     close : cost by which the best of two must lead, or both are asked.
     beam : poses that are tried with velocities and rates.
     alike_left : logarithm of the ratio of two shares from which one is better.
+    none : cost of no velocity or no rate at all, where columns may be one.
     left, named_left : share of a motion that a column may leave, without and with a fitting name.
     misled : share of the heading that a rate with another name may leave.
     off_unit : relative error of a factor from a unit, one standard deviation; a sensor is rarely off by more.
@@ -54,6 +55,7 @@ class SearchSettings:
     close: float = 1.5
     beam: int = 12
     alike_left: float = 0.22
+    none: float = 4.0
     left: float = 0.1
     named_left: float = 0.5
     misled: float = 0.1
