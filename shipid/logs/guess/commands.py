@@ -260,9 +260,7 @@ def _unit_of_shaft(
     in_radians = any(one.name == "psi" and one.unit == "rad" for one in state.suggestions)
     prior = {"rpm": 0.0, "rev/s": 0.0, "rad/s": 1.0 if in_radians else SETTINGS.turned_axis}
     off = {unit: np.log(_off_advance(state, state.columns[name], unit)) ** 2 for unit in prior}
-    cost = {
-        unit: prior[unit] + one + 2 * SETTINGS.turned_axis * (written not in (None, unit)) for unit, one in off.items()
-    }
+    cost = {unit: prior[unit] + one + SETTINGS.turned_axis * (written not in (None, unit)) for unit, one in off.items()}
     unit = min(cost, key=cost.__getitem__)
     if written is not None:
         unit = written if tunnel or not np.isfinite(cost[unit]) else unit
