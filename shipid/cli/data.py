@@ -16,7 +16,7 @@ from shipid.errors import ShipidError
 from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
-    from shipid.logs.guess.pose import Frame
+    from shipid.logs.guess.search import Frame
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
 

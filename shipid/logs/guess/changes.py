@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,22 +14,15 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.defects import clock_text
 from shipid.logs.guess.evidence import Complex
+from shipid.logs.guess.search import senses_of_angle
+from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of
 
-NODES, SPLITS = 120, 60  # places at which a part may begin or end
-LEAST = 0.05  # share of all motion that a part has, at least
-SEEN, BETTER = 0.005, 0.3  # share of the motion that one scale leaves, at least; of that what two leave, at most
-ALIKE, NOTHING = 1.4, 5e-4  # ratio of two scales, that are one; and that of a column that stands still
-CLEAR, TIMES = 8.0, 20.0  # t value of the effect of an order in each part, and ratio of the effects, at least
-MAKES_WAY = 0.4  # of the larger speeds, at least: an angle steers
-MOST_LEFT = 0.75  # share of what one effect leaves, that two leave, at most
-UNDER_WAY = 0.2  # of the median speed: of a slower ship, her way says little of the shaft
+NODES = 120  # places at which a part may begin or end
+NOTHING = 5e-4  # ratio of two scales of a column that stands still
 SHAFTS = [np.log(to_si(unit, "propeller.n")) for unit in ("rpm", "rad/s", "rev/s")]
-OF_UNITS = [one - other for one in SHAFTS for other in SHAFTS if one != other]  # logarithms of ratios of two units
-NEAR, ROUGHLY = np.log(1.25), np.log(2.0)  # how far a step is off one at most, and what is seen less well
-RUNNING = 0.2  # of the usual speed of the shaft in a part: of less, a step says little
-APART = 0.2  # of the logarithm of that ratio: how far revolutions over a metre scatter in each part, at most
+OF_UNITS = np.array([one - other for one in SHAFTS for other in SHAFTS if one != other])  # logarithms of their ratios
 
 
 @dataclass(frozen=True)
@@ -39,31 +34,107 @@ class ScalePart:
     ratio: float
 
 
+@dataclass(frozen=True)
+class Relation:
+    """Changes (W,) that are a scale times others: columns of the dataset, of the log, first rows (W,), what is seen."""
+
+    about: tuple[str, ...]
+    sources: list[str]
+    seen: Complex
+    ran: Complex
+    rows: NDArray[np.intp]
+    what: str
+
+
 def ask_for_changes(state: State) -> None:
-    """Ask where the scale or the sign of velocities, a yaw rate or an angle that steers is another one in a part."""
-    sources = {one.name: one.source for one in state.suggestions}
-    pairs: list[tuple[tuple[str, ...], str, Array | Complex, Array | Complex]] = []
-    if state.velocity is not None:
-        names = tuple(name for name in ("u", "v", "speed") if name in sources)
-        pairs.append((names, "track", state.position, state.velocity))
-    rates = [sources["r"]] if "r" in sources else state.called("r")[:1]
-    pairs += [(("r",), "change of the heading", state.psi, state.columns[name]) for name in rates]
-    for about, what, whole, rate in pairs:
-        named = [sources[name] for name in about if name in sources] or rates
-        part = other_part(state.chosen.change(whole), state.chosen.change(evidence.integrate_rate(state.t, rate)))
-        if part is not None:
-            middle = np.append((state.chosen.first + state.chosen.last) // 2, len(state.t))
-            first, end = int(middle[part.first]) if part.first else 0, int(middle[part.end])
-            columns = " and ".join(map(repr, named))
-            how = f"the {what} is {part.ratio:.3g} times as much, beside its integral, as elsewhere"
-            _ask_about_change(
-                state, about, f"has {columns} another unit or sign {_from_to(state, first, end)}? There {how}"
+    """Ask where velocities, a yaw rate, an angle or a shaft have another scale to the motion in a part of the log."""
+    for one in _relations(state):
+        part = other_part(one.seen, one.ran)
+        if part is None or (is_shaft(one.about[0]) and not _is_of_units(state, one, part)):
+            continue
+        rows = np.append(one.rows, len(state.t))
+        first, end = int(rows[part.first]) if part.first else 0, int(rows[part.end])
+        columns = " and ".join(map(repr, one.sources))
+        words = f"has {columns} another unit or sign {_from_to(state, first, end)}? There {one.what.format(part.ratio)}"
+        remedy = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
+        state.changed |= {*one.about}
+        state.ask(one.about, f"{words}. {remedy}")
+
+
+def ask_about_files(state: State, pause: float) -> None:
+    """Ask where a file has another frame, heading or sense of an angle than the others; `pause` [s] parts the files."""
+    edges = [0, *(1 + np.flatnonzero(np.diff(state.t) > 0.5 * pause)), len(state.t)]
+    middle, track = (state.chosen.first + state.chosen.last) // 2, state.chosen.change(state.position)
+    psi = next(one.source for one in state.suggestions if one.name == "psi")
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
+    for number, (first, end) in enumerate(pairwise(edges), 1):
+        inside, place = (middle >= first) & (middle < end), f"in file {number} of {len(edges) - 1}"
+        if not state.joined or len(edges) < 3 or inside.sum() < 20:
+            continue
+        (misfit, sense), (other, _) = senses_of_angle(track[inside], np.exp(1j * state.psi[middle[inside]]))
+        odd = sense.quarter != 0 or (sense.sign < 0 and other > 2.0 * misfit)
+        if odd and misfit < SETTINGS.poor and not state.astern:
+            words = (
+                f"{place} the track does not keep to {psi!r} as in the others: are its axes, or its heading, others?"
             )
-    for one in state.suggestions:
-        if is_command(one.name) and is_steering(signal_of(one.name)):
-            _ask_for_angle(state, one.name, one.source)
-        elif is_command(one.name) and is_shaft(one.name):
-            _ask_for_shaft(state, one.name, one.source)
+            state.ask(
+                ("psi", "north", "east", "latitude", "longitude"), f"{words} Then leave it out, and import it alone"
+            )
+        for source, sign in state.turning.items():
+            rows = slice(first, end)
+            signals = state.t[rows], r[rows], state.columns[source][rows]
+            effect = evidence.order_effect(*signals, state.part) / SETTINGS.seen
+            follows = evidence.order_correlation(*signals, 2 * state.part) / SETTINGS.followed
+            if sign * effect < -2 or (abs(effect) < 1 and sign * follows < -2):
+                names = tuple(one.name for one in state.suggestions if one.source == source)
+                words = f"{place} {source!r} turns the ship to the other side than in the others: has it another sign?"
+                state.ask(names, f"{words} Then import it alone")
+
+
+def _relations(state: State) -> Iterator[Relation]:
+    sources = {one.name: one.source for one in state.suggestions}
+    chosen, middle = state.chosen, (state.chosen.first + state.chosen.last) // 2
+    rates = [sources["r"]] if "r" in sources else state.called("r")[:1]
+    beside = "is {:.3g} times as much, beside its integral, as elsewhere"
+    if state.velocity is not None:
+        about = tuple(name for name in ("u", "v", "speed") if name in sources)
+        ran = chosen.change(evidence.integrate_rate(state.t, state.velocity))
+        columns = [sources[name] for name in about]
+        yield Relation(about, columns, chosen.change(state.position), ran, middle, f"the track {beside}")
+    for name in rates:
+        ran = chosen.change(evidence.integrate_rate(state.t, state.columns[name]))
+        yield Relation(("r",), rates, chosen.change(state.psi), ran, middle, f"the change of the heading {beside}")
+    way = np.abs(chosen.change(state.position))
+    speed = way / (state.t[chosen.last] - state.t[chosen.first])
+    for name, source in sources.items():
+        if is_command(name) and is_steering(signal_of(name)):
+            under = np.interp(state.t, state.t[chosen.first], speed) > 0.4 * np.percentile(speed, 90)
+            if (start := _other_turns(state, state.columns[source], under)) is not None:  # else thrust turns the ship
+                ran = np.ones(len(chosen.first), dtype=complex)
+                what = "its numbers turn the ship {:.2g} times as fast: to the other side where that is negative"
+                yield Relation((name,), [source], np.where(middle < start[0], ran, start[1]), ran, middle, what)
+        elif is_command(name) and is_shaft(name):
+            turns = np.abs(chosen.change(evidence.integrate_rate(state.t, state.columns[source])))
+            driven = (speed > 0.2 * np.median(speed)) & (turns > 0.0)
+            what = "the way of the ship is {:.2g} times as much for the same numbers"
+            yield Relation((name,), [source], way[driven] + 0j, turns[driven] + 0j, chosen.first[driven], what)
+
+
+def _other_turns(state: State, order: Array, under_way: NDArray[np.bool_]) -> tuple[int, float] | None:
+    """The row from which an order (N,) turns the ship otherwise, and how many times as fast; None where it does not."""
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
+    rows, design, change = evidence.yaw_regression(state.t, r, order, state.part)
+    kept = under_way[rows]
+    rows, design, change = rows[kept], design[kept], change[kept]
+    least, found = SETTINGS.two_left_of_turns * evidence.solve_least_squares(design, change)[2], None
+    for row in rows[np.unique(np.linspace(0, len(rows), NODES // 2 + 2).astype(int))[1:-1]]:
+        before = np.where(rows < row, design[:, 0], 0.0)
+        apart = np.column_stack([before, design[:, 0] - before, design[:, 1:]])
+        both, errors, left = evidence.solve_least_squares(apart, change)
+        clear = np.all(np.abs(both[:2]) > 2 * SETTINGS.seen * errors[:2])
+        if left < least and clear and not 0.05 < both[1] / both[0] < 20.0:  # else the speed is another one
+            least, found = left, (int(row), float(both[1] / both[0]))
+    return found
 
 
 def other_part(seen: Complex, ran: Complex) -> ScalePart | None:
@@ -76,7 +147,8 @@ def other_part(seen: Complex, ran: Complex) -> ScalePart | None:
     total = float(motion[-1])
     share = (motion[None, :] - motion[:, None]) / max(total, 1e-30)
     of_part, of_rest = (power[None, :] - power[:, None]), power[-1] - (power[None, :] - power[:, None])
-    possible = (np.minimum(share, 1.0 - share) > LEAST) & (np.minimum(of_part, of_rest) > 0.0)
+    possible = np.minimum(share, 1.0 - share) > SETTINGS.least_part
+    possible &= np.minimum(of_part, of_rest) > 0.0
     if not possible.any():
         return None
     inside = (cross[None, :] - cross[:, None]) / np.where(possible, of_part, 1.0)
@@ -84,78 +156,23 @@ def other_part(seen: Complex, ran: Complex) -> ScalePart | None:
     explained = np.where(possible, inside**2 * of_part + outside**2 * of_rest, -np.inf)
     first, end = np.unravel_index(int(np.argmax(explained)), explained.shape)
     one, two = total - cross[-1] ** 2 / power[-1], total - float(explained[first, end])
-    if one < SEEN * total or two > BETTER * one:
-        return None
     ratio = float(inside[first, end] / outside[first, end]) if outside[first, end] else 0.0
-    if not NOTHING < abs(ratio) < 1 / NOTHING or 1 / ALIKE < ratio < ALIKE:
+    if one < 0.005 * total or two > SETTINGS.two_left * one or not NOTHING < abs(ratio) < 1 / NOTHING:
         return None
-    return ScalePart(int(nodes[first]), int(nodes[end]), ratio)
+    return None if 1 / SETTINGS.alike < ratio < SETTINGS.alike else ScalePart(int(nodes[first]), int(nodes[end]), ratio)
 
 
-def _ask_for_angle(state: State, name: str, source: str) -> None:
-    """Ask where an angle turns the ship to the other side, or many times as fast, from some row on."""
-    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
-    rows, design, change = evidence.yaw_regression(state.t, r, state.columns[source], state.part)
-    seen = state.chosen
-    speed = np.abs(seen.change(state.position)) / (state.t[seen.last] - state.t[seen.first])
-    makes_way = np.interp(rows, seen.first, speed) > MAKES_WAY * np.percentile(speed, 90)  # else thrust turns her
-    rows, design, change = rows[makes_way], design[makes_way], change[makes_way]
-    whole = evidence.solve_least_squares(design, change)[2]
-    least, start, ratio = MOST_LEFT * whole, 0, 1.0
-    for row in np.unique(np.linspace(0, len(rows), SPLITS + 2).astype(int))[1:-1]:
-        before = np.where(np.arange(len(rows)) < row, design[:, 0], 0.0)
-        apart = np.column_stack([before, design[:, 0] - before, design[:, 1:]])
-        found, errors, left = evidence.solve_least_squares(apart, change)
-        if left >= least or not np.all(np.abs(found[:2]) > CLEAR * errors[:2]):
-            continue
-        if not 1 / TIMES < found[1] / found[0] < TIMES:  # else the speed is another one
-            least, start, ratio = left, int(rows[row]), float(found[1] / found[0])
-    if start == 0:
-        return
-    how = "to the other side" if ratio < 0 else f"{ratio:.2g} times as fast"
-    words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
-    _ask_about_change(state, (name,), f"{words} There its numbers turn the ship {how}")
-
-
-def _ask_for_shaft(state: State, name: str, source: str) -> None:
-    """Ask where the numbers of a shaft are at once some 6, 10 or 60 times as many, for the same way of the ship."""
-    size = np.abs(state.columns[source])
-    way = np.abs(state.chosen.change(state.position))
-    turns = np.abs(state.chosen.change(evidence.integrate_rate(state.t, state.columns[source])))
-    driven = np.flatnonzero((way > UNDER_WAY * np.median(way)) & (turns > 0.0))
-    if len(driven) < SPLITS:
-        return
-    first, a_metre = state.chosen.first[driven], np.log(turns[driven] / way[driven])
-    broken = np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))
-    least, start, more = APART, 0, 0.0
-    for row in _unit_change_rows(size, broken):
-        before = first < row
-        if not LEAST < np.mean(before) < 1 - LEAST:
-            continue
-        usual, level = (np.array([np.median(of[part]) for part in (before, ~before)]) for of in (size[first], a_metre))
-        here = usual if broken[row - 1] else size[row - 1 : row + 1]
-        if usual.min() == 0.0 or np.any(here < RUNNING * usual):
-            continue
-        change, step = level[1] - level[0], np.log(here[1] / here[0])
-        of_units = min(OF_UNITS, key=lambda one: abs(change - one))
-        near = (NEAR, ROUGHLY) if broken[row - 1] else (ROUGHLY, NEAR)
-        left = float(np.mean(np.abs(a_metre - np.where(before, *level)))) / max(abs(change), 1e-9)
-        if left < least and abs(change - of_units) < near[0] and abs(step - of_units) < near[1]:
-            least, start, more = left, row, float(np.exp(change))
-    if start:
-        words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
-        _ask_about_change(
-            state, (name,), f"{words} There its numbers are {more:.2g} times as many for the same way of the ship"
-        )
-
-
-def _unit_change_rows(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Rows (K,) whose numbers may be the first of another unit: the `SPLITS` largest steps, and rows behind a pause."""
-    low, high = np.minimum(size[:-1], size[1:]), np.maximum(size[:-1], size[1:])
-    leaps = np.flatnonzero(~broken & (low > 0.0) & (high > np.exp(min(map(abs, OF_UNITS)) - NEAR) * low))
-    leaps = leaps[np.argsort(-(low * high)[leaps], kind="stable")][:SPLITS]
-    breaks = np.flatnonzero(broken)
-    return 1 + np.union1d(leaps, breaks[:: max(1, len(breaks) // SPLITS)])
+def _is_of_units(state: State, one: Relation, part: ScalePart) -> bool:
+    """Whether the numbers of a shaft step where a part begins or ends as the ratio of two units says."""
+    size: Array = np.abs(state.columns[one.sources[0]])
+    near = float(np.min(np.abs(OF_UNITS + np.log(abs(part.ratio)))))
+    for edge in (part.first, part.end):
+        row = int(one.rows[min(edge, len(one.rows) - 1)])
+        about = size[max(row - 40, 0) : row + 40]
+        steps = np.abs(np.diff(np.log(np.maximum(about, 1e-3 * about.max())))) if about.max() > 0 else np.zeros(1)
+        if 0 < edge < len(one.rows) and near < 0.3 and np.min(np.abs(steps.max() - np.abs(OF_UNITS))) < 0.4:
+            return True
+    return False
 
 
 def _from_to(state: State, first: int, end: int) -> str:
@@ -165,9 +182,3 @@ def _from_to(state: State, first: int, end: int) -> str:
     if end >= len(state.t):
         return f"from {begins} on"
     return f"until {ends}" if first == 0 else f"from {begins} to {ends}"
-
-
-def _ask_about_change(state: State, about: tuple[str, ...], words: str) -> None:
-    remedy = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
-    state.changed |= {*about}
-    state.ask(about, f"{words}. {remedy}")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.amounts import UNIT_WORDS, is_known, north_reference, without_prefix
-from shipid.logs.guess.evidence import Complex, RowWindows, heal_angle, order_effect
+from shipid.logs.guess.evidence import Complex, RowWindows, order_effect, order_effects
 from shipid.logs.guess.words import (
     how_much_says,
     is_note,
@@ -24,7 +24,7 @@ from shipid.logs.guess.words import (
     side_in_name,
     units_in_name,
 )
-from shipid.logs.mapping import UNITS, to_si
+from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS, is_steering, signal_of
 
@@ -33,7 +33,6 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 
 
 PART = 0.4  # of the windows of the guess: about a quarter of a usual turn
-SEEN = 4.0  # t value of the effect of an order on the yaw rate, from which it is taken to turn the ship
 LONGEST_UNIT = 6  # letters of a unit that is not known
 LIKELY = 0.6  # confidence from which a suggestion is not marked as unsure
 OF_POSE = ("latitude", "longitude", "north", "east", "x", "y", "psi")
@@ -203,14 +202,13 @@ class State:
     velocity: Complex | None = None
     body: Complex | None = None
 
-    def angle(self, name: str, unit: str) -> Array:
-        """Angle [rad], (N,), of a column in this unit, unwrapped and without false samples."""
-        size = to_si(unit, "psi")
-        return size * heal_angle(self.columns[name], 2 * np.pi / size, self.t)[0]
-
     def effect(self, r: Array, order: Array) -> float:
         """The t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
         return order_effect(self.t, r, order, self.part)
+
+    def effects(self, r: Array, orders: Array) -> Array:
+        """The same (K,) of several orders (K, N) at once."""
+        return order_effects(self.t, r, orders, self.part)
 
     @property
     def part(self) -> float:

@@ -16,7 +16,7 @@ from shipid.arguments import as_names, as_path, check_choice, check_class
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
-from shipid.logs.guess.changes import ask_for_changes
+from shipid.logs.guess.changes import ask_about_files, ask_for_changes
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Clue, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
@@ -29,12 +29,12 @@ from shipid.logs.guess.defects import (
     take_zeros,
 )
 from shipid.logs.guess.lapses import report_command_faults
-from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
+from shipid.logs.guess.motion import check_clock, choose_motion, report_misnomers
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
-from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.scales import take_scales
+from shipid.logs.guess.search import Frame
 from shipid.logs.guess.sniff import LogTable
-from shipid.logs.guess.sources import GuessFiles, read_source
+from shipid.logs.guess.sources import PAUSE, GuessFiles, read_source
 from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import unused_reasons
 from shipid.logs.guess.wind import choose_wind
@@ -125,22 +125,18 @@ def guess(
             clock = "a recorder that writes what it has gathered does so: write the time at which each row was measured"
         raise DataError(f"{rows}: {clock}", file=source.path)
     outputs = reserve_outputs(state)
-    choose_pose(state, source.path, frame)
-    if state.numbered:  # or a yaw rate, which a sway speed resembles, may be taken for one
-        choose_yaw_rate(state, 0.05)
-    choose_velocities(state)
+    choose_motion(state, source.path, frame)
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
     for doubt in sniffed.doubts:
         state.ask(("clock", "t"), doubt)
     clock = str(sniffed.clock["from"])
     if sniffed.clock["unit"] != "date" and not (is_clock(clock) or state.numbered):
         state.ask(("clock",), f"no column is called a clock: {clock!r} rises from row to row. Is it the time?")
-    if state.r is None:
-        choose_yaw_rate(state)
     choose_commands(state)
     suggest_outputs(state, outputs)
     if vessel is not None:
         name_commands(state, vessel)
+    report_misnomers(state)
     _choose_other_columns(state)
     choose_wind(state)
     defects_of_rows(state, sniffed)
@@ -148,6 +144,7 @@ def guess(
     report_command_faults(state, sniffed)
     defects_of_spikes(state)
     ask_for_changes(state)
+    ask_about_files(state, PAUSE)
     defects_of_motion(state)
     left = unused_reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)

@@ -1,9 +1,9 @@
-"""Choose the commands: rudder, azimuth and shaft columns by name, their sign and unit by what they do to the ship."""
+"""Choose the commands: names say what a column may be; what the ship does after it changes its sense, zero and unit."""
 
 from __future__ import annotations
 
 import re
-from itertools import product
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from shipid.data.dataset import Array
 from shipid.logs.frames import may_wrap
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import SEEN, State, unit_in_name
-from shipid.logs.guess.twins import choose_twins, twin_columns
+from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import (
     is_electrical,
     is_engine,
@@ -22,129 +22,146 @@ from shipid.logs.guess.words import (
     number_in_name,
     units_in_name,
 )
-from shipid.logs.mapping import to_si
+from shipid.logs.mapping import UNITS, to_si
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, rows_of_role, signal_of
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
-SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
-FOLLOWED = 0.4  # correlation of the yaw rate with an order before it, from which its sign is taken, else
-ADVANCE = 0.01  # way of the ship in one turn of the shaft, over the radius of a usual turn; of ships 0.002 to 0.05
-FASTEST = 200.0  # rev/s: no shaft is faster, not that of a small craft that turns within a length, either
-QUICK = 50.0  # rev/s: few screws are as fast, and per cent of a shaft speed are such numbers
-TOGETHER = 0.2  # of the range of a column: how far twin rudders are apart
 TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
-USUAL = np.radians(20.0)  # rudder angle of a usual turn
 LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
-BOTH_SIDES = 0.2  # of all turning, that is to the lesser side
+FASTEST, GEARED = 200.0, 5.0  # rev/s: no shaft is faster; an engine that is faster usually has a gear
+PULSES = (700.0, 2300.0)  # us: what a servo takes is about 1500, from 1000 to 2000
 SHARES = {
     ("per cent", "%", "pct", "percent", "prozent"): 100.0,
     ("per mille", "‰", "permille", "promille", "permil"): 1000.0,
     ("shares of 1", "norm", "normalised", "normalized", "-1..1", "-1...1", "-1 to 1", "p.u.", "pu"): 1.0,
 }
 """Words for a share of the largest value -> what that value is in it."""
-ASTERN = -0.5  # mean cosine of an azimuth angle, at most, that points aft
-GEARED = 5.0  # rev/s: an engine that is faster usually has a gear
-UNDER_WAY, NEARLY_ALWAYS = 0.3, 0.9  # of the usual way in a window; share of these windows
-RUNS = 0.5  # of the larger speeds of a shaft: one that is slower may not drive the ship
-NEAR = 15.0  # times from that: a unit further off is doubted
+OF_ACTUATORS = frozenset(
+    "throttle throttles thrust thruster motor motors engine esc pwm power gas servo rcou "
+    "chan channel out us raw".split()
+)
+"""Words that say an order of an actuator, and not of which kind."""
 
 
 def choose_commands(state: State) -> None:
-    """Choose angles that steer, then shafts and pitches; without any, throttles of two sides."""
+    """Choose angles, shafts and pitches by name and effect; then orders of actuators by their effect alone."""
     r = state.r if state.r is not None else np.gradient(state.psi, state.t)
     used: dict[str, int] = {}
-    azimuth = _choose_steering(state, r, used)
-    _choose_thrust(state, azimuth, used)
-    if not any(is_command(one.name) and is_shaft(one.name) for one in state.suggestions):
-        choose_twins(state, r)
-
-
-def _choose_steering(state: State, r: Array, used: dict[str, int]) -> bool:
-    """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
     angles = _columns_named_for(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
-    turned = {name for name, signal in angles if _centre_angle(state, name, signal)}
-    power = {name: state.effect(r, state.columns[name]) for name in state.eligible()}
-    by_name = bool(angles)
-    if not angles:
-        # an order is held: rows repeat the value before, to 1/100 of the range; a response such as roll does not
-        screws = _screw_columns(state)
-        strength = {
-            name: power[name] * (0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values))))
-            for name in power
-            for values in [state.columns[name]]
-            if 0 < np.abs(values).max() < 95 and np.ptp(values) > 0 and name not in screws
-        }
-        likely = max(strength, key=lambda name: abs(strength[name]), default="")
-        angles = [(likely, "delta")] if likely and abs(strength[likely]) > SEEN else []
-    azimuth = any(SIGNALS[signal].component == AZIMUTH for _, signal in angles)
     for name, signal in angles:
-        unit = likely_unit(state, name, signal)
-        effect = power.get(name, 0.0)
-        extra: dict[str, Any] = {"wrap": True} if name in turned else {}
-        followed = 0.0
-        why = "by its name; it is not seen to turn the ship, so that its sign is not known"
-        confidence = 0.5 if by_name else 0.4
-        if by_name and abs(effect) <= SEEN:
-            span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
-            followed = evidence.order_correlation(state.t, r, state.columns[name], span)
-            if abs(followed) > FOLLOWED:
-                effect = float(1.01 * SEEN * np.sign(followed))
-            else:
-                followed = 0.0
-        if state.astern and signal == "delta":
-            effect = -effect
-            state.ask(
-                (signal,),
-                "the ship goes astern, and a rudder is taken to turn her the other way there"
-                f": is {name!r} positive to {'starboard' if effect > 0 else 'port'}?",
+        _take_angle(state, r, name, signal, used)
+    _ask_about_sides(state)
+    azimuth = any(signal == "alpha" for _, signal in angles)
+    for signal in (signal for signal in rows_of_role("command") if not is_steering(signal)):
+        named = _columns_named_for(state, [signal])
+        for name, _ in sorted(named, key=lambda one: state.side_of(one[0]) in TUNNELS):
+            _take_thrust(state, name, signal, azimuth, used)
+    steered = bool(angles)
+    if not any(is_command(one.name) and is_shaft(one.name) for one in state.suggestions):
+        steered = _take_actuators(state, r, steered, used) or steered
+    if not steered:
+        _take_unnamed_rudder(state, r, used)
+
+
+def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]]:
+    """The columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
+    fits: dict[str, tuple[float, str]] = {}
+    for signal in signals:
+        for name in state.free():
+            scores, said = meaning_scores(name), state.command_of(name)
+            score = (
+                1.0
+                if signal_of(said) == signal
+                else 0.0
+                if said or name not in state.called(signal)
+                else scores[signal]
             )
-        if abs(effect) > SEEN:
-            state.turning[name] = float(np.sign(effect))
-            confidence = 0.95 if by_name else 0.55
-            # sides to which it turns the ship, and to which it does not
-            sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
-            seen = f"t value {abs(effect):.0f}" if followed == 0.0 else f"correlation {abs(followed):.2f}"
-            seen += ", the other way astern" * (state.astern and signal == "delta")
-            why = f"positive turns the ship to {sides[0]} ({seen})"
-            if (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
-                extra["sign"] = -1
-                state.find(
-                    "wrong sign of rudder",
-                    (name,),
-                    confidence,
-                    f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}",
-                )
-        share = _ask_for_share(state, name, signal, unit)
-        if share or (signal == "delta" and name not in turned and _ask_for_side(state, name, r)):
-            confidence, why = 0.3, f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            why += share or ", and never negative"
-            if not share:
-                extra.pop("sign", None)
-                state.findings[:] = [one for one in state.findings if one.columns != (name,)]
-        if signal == "alpha":
-            _ask_for_half_turn(state, name, unit, int(extra.get("sign", 1)))
-        side = state.side_of(name)
-        component = side or SIGNALS[signal].component
-        if signal == "delta" and side:
-            component = f"{side}_rudder"
-        state.suggest(
-            _command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra
+            others = max((fit for meaning, fit in scores.items() if meaning not in signals), default=0.0)
+            if score > fits.get(name, (0.0, ""))[0] and (said or score >= others):
+                fits[name] = score, signal
+    groups: dict[tuple[str | int | None, str], list[str]] = {}
+    still = {name: not np.ptp(state.columns[name]) for name in fits}  # a feedback that is not connected comes last
+    for name in sorted(fits, key=lambda one: (still[one], is_order(one), -fits[one][0])):
+        side, number = state.side_of(name), number_in_name(name)
+        both = f"{side} {number}" if side and number and state.commands else side or number
+        groups.setdefault((state.command_of(name) or both, fits[name][1]), []).append(name)
+    sided = any(place is not None and not str(place).startswith(TUNNELS) for place, _ in groups)
+    chosen = []
+    for (place, signal), names in groups.items():
+        if place is None and sided and is_order(names[0]):
+            continue
+        if len(names) > 1:
+            rest = ", ".join(map(repr, names[1:]))
+            words = f"{names[0]!r} is taken, of the same: {rest}"
+            state.find("several columns for one command", tuple(names), 0.6, words)
+        chosen.append((names[0], signal))
+    order = list(state.columns)
+    return sorted(chosen, key=lambda entry: order.index(entry[0]))
+
+
+# --- angles ---
+
+
+def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, int], sure: bool = True) -> None:
+    """Suggest a column as an angle that steers, with the sign that the yaw rate shows."""
+    turned = _centre_angle(state, name, signal)
+    unit = likely_unit(state, name, signal)
+    extra: dict[str, Any] = {"wrap": True} if turned else {}
+    effect, seen = _turning_effect(state, r, name, sure)
+    top = float(np.abs(state.columns[name]).max())
+    astern = state.astern and signal == "delta"
+    confidence = 0.5 if sure else 0.4
+    why = "by its name; it is not seen to turn the ship, so that its sign is not known"
+    if effect:
+        effect = -effect if astern else effect
+        state.turning[name] = float(np.sign(effect))
+        sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
+        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} ({seen})"
+        if astern:
+            words = f"the ship goes astern, and a rudder is taken to turn it the other way there: is {name!r}"
+            state.ask((signal,), f"{words} positive to {sides[0]}?")
+    share = _ask_for_share(state, name, signal, unit)
+    unsided = signal == "delta" and not turned and not share and _is_unsided(state, name, r)
+    if unsided:
+        words = (
+            f"{name!r} is never negative, but the ship turns to both sides: which column says the side of the rudder"
         )
-    _ask_if_opposite(state)
-    return azimuth
+        state.ask(("delta",), f"{words}, or which value is amidships (offset)?")
+    if share or unsided:
+        confidence, why = 0.3, f"by its name; up to {top:.4g}{share or ', and never negative'}"
+    if effect and not unsided and (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is one aft of the origin
+        extra["sign"] = -1
+    if signal == "alpha":
+        _ask_for_half_turn(state, name, unit, int(extra.get("sign", 1)))
+    side = state.side_of(name)
+    component = (f"{side}_rudder" if signal == "delta" else side) if side else SIGNALS[signal].component
+    state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
-def _ask_if_opposite(state: State) -> None:
-    angles = [one for one in state.suggestions if is_command(one.name) and one.source in state.turning]
-    for port, starboard in product(angles, angles):
-        sides = state.side_of(port.source), state.side_of(starboard.source)
-        same = signal_of(port.name) == signal_of(starboard.name) and sides == ("port", "starboard")
-        if same and state.turning[port.source] != state.turning[starboard.source]:
-            state.ask(
-                (port.name, starboard.name),
-                f"{port.source!r} and {starboard.source!r} are seen to turn the ship to opposite sides"
-                f": do they count so, or is the sign of one wrong?",
-            )
+def _turning_effect(state: State, r: Array, name: str, named: bool) -> tuple[float, str]:
+    """Effect of an order on the yaw rate, and how it is seen; 0 where it is not."""
+    effect = state.effect(r, state.columns[name])
+    if abs(effect) > SETTINGS.seen:
+        return effect, f"t value {abs(effect):.0f}" + ", the other way astern" * state.astern
+    span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
+    follows = evidence.order_correlation(state.t, r, state.columns[name], span) if named else 0.0
+    return (follows, f"correlation {abs(follows):.2f}") if abs(follows) > SETTINGS.followed else (0.0, "")
+
+
+def _centre_angle(state: State, name: str, signal: str) -> bool:
+    """Put an angle that jumps at a whole turn within half a turn of zero; return whether it does."""
+    values, size = state.columns[name], to_si(likely_unit(state, name, signal), f"x.{signal}")
+    turn = 2 * np.pi / size
+    if not np.any(np.abs(np.diff(values)) > 0.8 * turn) or not may_wrap(size * values, f"x.{signal}"):
+        return False
+    state.columns[name] = np.asarray((values + turn / 2) % turn - turn / 2)
+    return True
+
+
+def _is_unsided(state: State, name: str, r: Array) -> bool:
+    """Whether an angle is never negative although the ship turns to both sides."""
+    sides = [float(np.sum(np.clip(sign * r, 0, None))) for sign in (1, -1)]
+    return bool(state.columns[name].min() >= 0 < np.ptp(state.columns[name]) and min(sides) > 0.2 * sum(sides))
 
 
 def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
@@ -153,247 +170,288 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
     said = {text.strip().lower() for text in units_in_name(name)} | {*name_parts(name)[-1:], *re.findall("[%‰]", name)}
     for words, full in SHARES.items():
         if said & set(words):
-            remedy = f"Write factor = (deg at {full:g}) / {full:g}"
-            state.ask((signal,), f"{name!r} is in {words[0]}: of which angle? {remedy}")
+            state.ask(
+                (signal,), f"{name!r} is in {words[0]}: of which angle? Write factor = (deg at {full:g}) / {full:g}"
+            )
             return " of an angle that the log does not say"
-    if unit_in_name(name, SIGNALS[signal].unit) is not None or not is_steering(signal):
+    if unit_in_name(name, SIGNALS[signal].unit) is not None:
         return ""
     if state.ask_for_unit(signal, name, unit):
         return " in a unit that is not known"
     others = next((one.unit for one in state.suggestions if one.name == "psi"), None)
+    begins = f"{name!r}, up to {top:.4g}, has no unit"
     if unit == "rad" and (others == "deg" or top == 1.0) and top <= 1.0:
-        state.ask(
-            (signal,),
-            f"{name!r}, up to {top:.4g}, has no unit: rad, deg, or a share (-1 to 1) of the largest angle?"
-            f" rad is a guess",
-        )
+        state.ask((signal,), f"{begins}: rad, deg, or a share (-1 to 1) of the largest angle? rad is a guess")
     elif signal == "delta" and top > LARGEST:
-        state.ask(
-            (signal,),
-            f"{name!r}, up to {top:.4g}, has no unit: deg, or per cent or per mille of the largest angle?"
-            f" deg is a guess",
-        )
+        state.ask((signal,), f"{begins}: deg, or per cent or per mille of the largest angle? deg is a guess")
     return ""
-
-
-def _ask_for_side(state: State, name: str, r: Array) -> bool:
-    """Ask where a rudder angle is never negative and the ship turns to both sides; return whether it is so."""
-    values = state.columns[name]
-    if values.min() < 0 or np.ptp(values) == 0:
-        return False
-    sides = [float(np.sum(np.clip(sign * r, 0, None))) for sign in (1, -1)]
-    if min(sides) < BOTH_SIDES * sum(sides):
-        return False
-    state.ask(
-        ("delta",),
-        f"{name!r} is never negative, but the ship turns to both sides: which column says the side of the rudder, "
-        f"or which value is amidships (offset)?",
-    )
-    return True
 
 
 def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
     """Ask where an azimuth angle is about half a turn while the ship goes ahead: it may say where the water goes."""
     turn = to_si(unit, "x.alpha")
     astern = state.astern or any(np.mean(state.columns[one] < 0) > 0.5 for one in state.called("n"))
-    if astern or np.mean(np.cos(turn * state.columns[name])) > ASTERN:
-        return
-    half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"
-    state.ask(
-        ("alpha",),
-        f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
-        f" Then write {half}; here 0 is a thrust ahead",
-    )
+    if not astern and np.mean(np.cos(turn * state.columns[name])) <= -0.5:
+        words = f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
+        half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"
+        state.ask(("alpha",), f"{words} Then write {half}; here 0 is a thrust ahead")
 
 
-def _screw_columns(state: State) -> set[str]:
-    """Columns that are no rudder: their names say a screw, or the two sides do not move together as twin rudders do."""
-    columns = state.columns
-    apart = {
-        name
-        for pair in twin_columns(state)
-        if np.ptp(columns[pair[0]] - columns[pair[1]]) > TOGETHER * max(np.ptp(columns[name]) for name in pair)
-        for name in pair
-    }
-    return apart | {
-        name for signal in rows_of_role("command") if not is_steering(signal) for name in state.called(signal)
-    }
+def _ask_about_sides(state: State) -> None:
+    """Ask where the angles of two sides turn the ship to opposite sides."""
+    angles = [one for one in state.suggestions if is_command(one.name) and one.source in state.turning]
+    for one, other in combinations(angles, 2):
+        sides = {state.side_of(one.source), state.side_of(other.source)}
+        alike = signal_of(one.name) == signal_of(other.name) and sides == {"port", "starboard"}
+        if alike and state.turning[one.source] != state.turning[other.source]:
+            words = f"{one.source!r} and {other.source!r} are seen to turn the ship to opposite sides"
+            state.ask((one.name, other.name), f"{words}: do they count so, or is the sign of one wrong?")
 
 
-def _centre_angle(state: State, name: str, signal: str) -> bool:
-    """Put an angle that jumps at a whole turn within half a turn of zero; return whether it does."""
-    values = state.columns[name]
-    size = to_si(likely_unit(state, name, signal), f"x.{signal}")
-    turn = 2 * np.pi / size
-    jumps = np.abs(np.diff(values)) > 0.8 * turn
-    if not jumps.any() or not may_wrap(size * values, f"x.{signal}"):
-        return False
-    state.columns[name] = np.asarray((values + turn / 2) % turn - turn / 2)
-    return True
+def _take_unnamed_rudder(state: State, r: Array, used: dict[str, int]) -> None:
+    """Suggest the column that turns the ship most as a rudder: one that is held, as orders are, and no screw."""
+    screws = {name for pair in twin_columns(state) for name in pair}
+    screws |= {name for signal in rows_of_role("command") for name in state.called(signal) if not is_steering(signal)}
+    strength = {}
+    for name in state.eligible():
+        values = state.columns[name]
+        if 0 < np.abs(values).max() < 95 and name not in screws:
+            held = 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values)))
+            strength[name] = abs(state.effect(r, values)) * held
+    likely = max(strength, key=strength.__getitem__, default="")
+    if likely and strength[likely] > SETTINGS.seen:
+        _take_angle(state, r, likely, "delta", used, sure=False)
 
 
-def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]]:
-    """The columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
-    orders: dict[str, tuple[float, str]] = {}
-    for signal in signals:
-        said = [name for name in state.free() if signal_of(state.command_of(name)) == signal]
-        for name in said:
-            orders[name] = (1.0, signal)
-        for name in state.called(signal):
-            score = meaning_scores(name)[signal]
-            others = max(
-                (value for meaning, value in meaning_scores(name).items() if meaning not in signals), default=0.0
-            )
-            if (
-                not state.command_of(name)
-                and score >= others
-                and score > orders.get(name, (0.0, ""))[0]
-                and np.ptp(state.columns[name]) >= 0
-            ):
-                orders[name] = (score, signal)
-    groups: dict[tuple[str | int | None, str], list[str]] = {}
-    sides = {name: state.side_of(name) for name in orders}
-    still = {name: not np.ptp(state.columns[name]) for name in orders}  # a feedback that is not connected comes last
-    for name in sorted(orders, key=lambda one: (still[one], is_order(one), -orders[one][0])):
-        side, number = sides[name], number_in_name(name)
-        both = f"{side} {number}" if side and number and state.commands else side or number
-        groups.setdefault((state.command_of(name) or both, orders[name][1]), []).append(name)
-    chosen = []
-    sided = any(place is not None and not str(place).startswith(TUNNELS) for place, _ in groups)
-    for (place, signal), names in groups.items():
-        if place is None and sided and is_order(names[0]):
-            continue
-        kept = names[:1]
-        if len(names) > 1:
-            rest = ", ".join(map(repr, names[1:]))
-            state.find(
-                "several columns for one command", tuple(names), 0.6, f"{names[0]!r} is taken, of the same: {rest}"
-            )
-        chosen += [(name, signal) for name in kept]
-    order = list(state.columns)
-    return sorted(chosen, key=lambda entry: order.index(entry[0]))
+# --- shafts ---
 
 
-def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
-    for signal in (signal for signal in rows_of_role("command") if not is_steering(signal)):
-        for name, _ in sorted(_columns_named_for(state, [signal]), key=lambda one: state.side_of(one[0]) in TUNNELS):
-            usual = SIGNALS[signal].component
-            fallback = AZIMUTH if azimuth and usual == SCREW else usual
-            component = state.side_of(name) or fallback
-            if SIGNALS[signal].shaft:
-                tunnel = component in TUNNELS and not is_electrical(name)
-                unit, confidence, why, extra = (_tunnel_unit if tunnel else _shaft_unit)(state, name)
-                if not tunnel and not azimuth and _runs_astern(state, name):
-                    extra = {**extra, "sign": -1}
-                    state.find(
-                        "wrong sign of the shaft",
-                        (name,),
-                        0.9,
-                        f"{name!r} is negative while the ship goes ahead; here ahead is positive",
-                    )
-            else:
-                written = unit_in_name(name, SIGNALS[signal].unit)
-                unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
-                confidence = 0.3 if not written and state.ask_for_unit(signal, name, unit) else confidence
-                why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            state.suggest(
-                _command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra
-            )
-
-
-def _runs_astern(state: State, name: str) -> bool:
-    middle = (state.chosen.first + state.chosen.last) // 2
-    ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
-    fast = ahead > UNDER_WAY * float(np.percentile(np.abs(ahead), 90))
-    return bool(fast.any() and np.mean(state.columns[name][middle[fast]] < 0) > NEARLY_ALWAYS)
-
-
-def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
-    """The same as `_shaft_unit` of a screw that does not drive the ship: her way says nothing of its unit."""
+def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict[str, int]) -> None:
+    """Suggest a column as the speed of a shaft, or a pitch, in the unit that the way of the ship shows."""
+    usual = SIGNALS[signal].component
+    component = state.side_of(name) or (AZIMUTH if azimuth and usual == SIGNALS["n"].component else usual)
     top = float(np.abs(state.columns[name]).max())
     why = f"by its name; up to {top:.4g}"
-    written = unit_in_name(name, "rev/s")
-    if written is not None and written != "%":
-        return written, 0.9, why, {}
-    if written == "%":
-        return _shaft_unit(state, name)
-    others = [one.unit for one in state.suggestions if one.name.endswith(".n")]
-    unit = others[0] if others else likely_unit(state, name, "n")
-    state.ask(
-        ("n",), f"in which unit is {name!r}, up to {top:.4g}? The way of the ship does not say: {unit} is a guess"
-    )
-    return unit, 0.4, f"{why}; in {unit} as the other shafts" if others else why, {}
+    extra: dict[str, Any] = {}
+    written = unit_in_name(name, SIGNALS[signal].unit)
+    if not SIGNALS[signal].shaft:
+        unit, confidence = likely_unit(state, name, signal), 0.9 if written else 0.7
+        confidence = 0.3 if not written and state.ask_for_unit(signal, name, unit) else confidence
+    else:
+        tunnel = component in TUNNELS and not is_electrical(name)
+        unit, confidence, more, extra = _unit_of_shaft(state, name, written, top, tunnel)
+        why += more
+        if not tunnel and not azimuth and _runs_astern(state, name):
+            extra = {**extra, "sign": -1}
+            why += "; negative while the ship goes ahead"
+    state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
-def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
-    """Unit, confidence, reason and further keys of a shaft speed, by the distance of the ship in one turn."""
-    values = state.columns[name]
-    top = float(np.abs(values).max())
-    written = unit_in_name(name, "rev/s")
-    why = f"by its name; up to {top:.4g}"
-    if is_electrical(name):
-        remedy = "Write factor = 2 / poles; a gear divides it further"
-        state.ask(("n",), f"{name!r}, up to {top:.4g}, is the electrical speed of a motor: of how many poles? {remedy}")
-        return "rpm", 0.3, f"{why} electrical rpm, of a number of poles that the log does not say", {"factor": 1.0}
-    if written == "%":
-        state.ask(("n",), f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100")
-        return "rpm", 0.3, f"{why} per cent of a shaft speed that the log does not say", {"factor": 1.0}
-    off = {unit: _off_advance(state, values, unit) for unit in ("rpm", "rev/s")}
-    by_motion = min(off, key=lambda unit: off[unit])
+def _unit_of_shaft(
+    state: State, name: str, written: str | None, top: float, tunnel: bool
+) -> tuple[str, float, str, dict[str, Any]]:
+    """Unit, confidence, reason and further keys of a shaft speed, by its name and the way of the ship in one turn."""
+    begins, about = f"{name!r}, up to {top:.4g}", ("n",)
+    if is_electrical(name) or written == "%":
+        electrical = f"{begins}, is the electrical speed of a motor: of how many poles? Write factor = 2 / poles"
+        share = f"{name!r} is in per cent: of which shaft speed? Write factor = (rpm at 100 %) / 100"
+        state.ask(about, electrical if is_electrical(name) else share)
+        return "rpm", 0.3, " of what the log does not say", {"factor": 1.0}
+    in_radians = any(one.name == "psi" and one.unit == "rad" for one in state.suggestions)
+    prior = {"rpm": 0.0, "rev/s": 0.0, "rad/s": 1.0 if in_radians else SETTINGS.turned_axis}
+    off = {unit: np.log(_off_advance(state, state.columns[name], unit)) ** 2 for unit in prior}
+    cost = {unit: prior[unit] + one + SETTINGS.turned_axis * (written not in (None, unit)) for unit, one in off.items()}
+    unit = min(cost, key=cost.__getitem__)
     if written is not None:
-        far = off.get(written, 1.0)
-        if written in off and far > NEAR and off[by_motion] < NEAR / 3 and by_motion != written:
-            state.find(
-                "unit of the shaft",
-                (name,),
-                0.6,
-                f"{name!r} says {written}, but the ship would run {far:.0f} times too far or too little in a turn"
-                f" of the shaft: it is read in {by_motion}",
-            )
-            return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
-        if written in ("rpm", "rev/s") and top * to_si(written, "propeller.n") > GEARED and is_engine(name):
-            state.ask(
-                ("n",),
-                f"{name!r}, up to {top:.4g} {written}, is the speed of an engine: is there a gear?"
-                f" Write factor = 1 / its ratio",
-            )
-        return written, 0.9, why, {}
-    if state.ask_for_unit("n", name, by_motion):
-        return by_motion, 0.3, f"{why} in a unit that is not known", {}
-    if top <= 130.0 and off[by_motion] < NEAR and (by_motion == "rpm" or top > QUICK):
-        state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: {by_motion}, or per cent of a shaft speed?")
-    if off[by_motion] > NEAR or not np.isfinite(off[by_motion]):
-        unit = likely_unit(state, name, "n")
-        state.ask(("n",), f"in which unit is {name!r}, up to {top:.4g}? {unit} is a guess")
-        return unit, 0.4, why, {}
-    angles = next((one.unit for one in state.suggestions if one.name == "psi"), "")
-    if by_motion == "rev/s" and angles == "rad" and _off_advance(state, values, "rad/s") < NEAR:
-        state.ask(("n",), f"{name!r}, up to {top:.4g}, has no unit: rev/s, or rad/s, as angles are in rad here?")
-        return by_motion, 0.5, f"{why}; the way in a turn of the shaft says rev/s or rad/s", {}
-    return by_motion, 0.7, f"{why}; the way in a turn of the shaft says {by_motion}", {}
+        unit = written if tunnel or not np.isfinite(cost[unit]) else unit
+        if unit == written != "rad/s" and top * to_si(unit, "propeller.n") > GEARED and is_engine(name):
+            words = f"{begins} {unit}, is the speed of an engine: is there a gear? Write factor = 1 / its ratio"
+            state.ask(about, words)
+        return (
+            (unit, 0.9, "", {}) if unit == written else (unit, 0.6, f"; as the way in a turn says, not {written}", {})
+        )
+    if state.ask_for_unit("n", name, unit):
+        return unit, 0.3, " in a unit that is not known", {}
+    shafts = [one.unit for one in state.suggestions if one.name.endswith(".n")]
+    if tunnel or not off[unit] < SETTINGS.near:
+        unit = shafts[0] if tunnel and shafts else likely_unit(state, name, "n")
+        state.ask(about, f"in which unit is {begins}? The way of the ship does not say: {unit} is a guess")
+        return unit, 0.4, f"; in {unit} as the other shafts" * bool(tunnel and shafts), {}
+    rivals = [one for one in cost if one != unit and cost[one] < cost[unit] + SETTINGS.turned_axis * in_radians]
+    rivals += ["per cent of a shaft speed"] * (top <= 130.0 and (unit == "rpm" or top > 50.0))
+    if rivals:
+        why = ", as angles are in rad here" * ("rad/s" in rivals)
+        state.ask(about, f"{begins}, has no unit: {unit}, or {', or '.join(rivals)}{why}?")
+    why = f"; the way in a turn of the shaft says {' or '.join([unit, *rivals])}"
+    return unit, 0.5 if "rad/s" in rivals else 0.7, why, {}
 
 
 def _off_advance(state: State, values: Array, unit: str) -> float:
     """How many times the way in a turn of the shaft, in turning radii, is off that of a usual ship."""
-    if np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
-        return np.inf
-    shaft = np.abs(values[(state.chosen.first + state.chosen.last) // 2]) * to_si(unit, "propeller.n")
-    runs = shaft > RUNS * np.percentile(shaft, 95)
+    size = to_si(unit, "propeller.n")
+    shaft = np.abs(values[(state.chosen.first + state.chosen.last) // 2]) * size
+    runs = shaft > 0.5 * np.percentile(shaft, 95)
     turned = state.chosen.change(state.psi).real / (state.t[state.chosen.last] - state.t[state.chosen.first])
     rate = float(np.percentile(np.abs(turned[runs]), 90)) / _hard_over(state) if runs.any() else 0.0
-    if rate == 0.0:
+    if rate == 0.0 or np.abs(values).max() * size > FASTEST:
         return np.inf
-    ratio = rate / float(np.median(shaft[runs])) / ADVANCE
+    ratio = rate / float(np.median(shaft[runs])) / SETTINGS.advance
     return max(ratio, 1.0 / ratio)
 
 
 def _hard_over(state: State) -> float:
-    """The larger rudder angles over that of a usual turn, at most 1: small ones turn the ship less."""
-    for column in state.suggestions:
-        if column.name.endswith(".delta"):
-            angle = np.abs(state.columns[column.source]) * to_si(column.unit, "rudder.delta")
-            return float(np.clip(np.percentile(angle, 90) / USUAL, 0.05, 1.0))
-    return 1.0
+    """The larger rudder angles over the 20 deg of a usual turn, at most 1: small ones turn the ship less."""
+    rudders = [one for one in state.suggestions if one.name.endswith(".delta")]
+    angles = [np.abs(state.columns[one.source]) * to_si(one.unit, "rudder.delta") for one in rudders[:1]]
+    return float(np.clip(np.percentile(angles, 90) / np.radians(20.0), 0.05, 1.0)) if angles else 1.0
+
+
+def _runs_astern(state: State, name: str) -> bool:
+    """Whether a shaft is negative nearly always when the ship goes ahead."""
+    middle = (state.chosen.first + state.chosen.last) // 2
+    ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
+    fast = ahead > 0.3 * float(np.percentile(np.abs(ahead), 90))
+    return bool(fast.any() and np.mean(state.columns[name][middle[fast]] < 0) > SETTINGS.astern)
+
+
+# --- actuators whose quantity no name says ---
+
+
+def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int]) -> bool:
+    """Suggest throttles, pulses and shares by what they do to the ship; return whether one steers.
+
+    Two that turn the ship against each other are screws of two sides, one that turns it a rudder, one that drives it
+    a screw.
+    """
+    speed = np.real(np.gradient(state.position, state.t) * np.exp(-1j * state.psi))
+    columns = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and _may_be_actuator(state, name)]
+    twins = [pair for pair in twin_columns(state) if {*pair} <= {*columns}]
+    turn = {name: state.effect(r, state.columns[name]) for name in columns}
+    push = {name: state.effect(speed, state.columns[name]) for name in columns}
+    sure = [name for name in columns if _says_actuator(state, name)]
+    if not twins:
+        twins = [
+            (one, other) if both[0] > 0 else (other, one)
+            for one, other in combinations(sure, 2)
+            for both in [state.effects(r, np.stack([state.columns[one], state.columns[other]]))]
+            if both[0] * both[1] < 0.0
+            and np.abs(both).min() > SETTINGS.seen
+            and state.effect(speed, state.columns[one] + state.columns[other]) > SETTINGS.seen / 2
+            and not {state.side_of(one), state.side_of(other)} & {"port", "starboard"}
+        ]
+    turning = {pair: state.effect(r, state.columns[pair[0]] - state.columns[pair[1]]) for pair in twins}
+    pair = max(turning, key=lambda one: abs(turning[one]), default=None)
+    if pair is not None and abs(turning[pair]) >= SETTINGS.seen:
+        _take_twins(state, pair, turning[pair])
+        return True
+    steers = max(sure, key=lambda name: abs(turn[name]), default="")
+    if steers and not steered and abs(turn[steers]) > SETTINGS.seen:
+        _take_servo(state, steers, turn[steers], used)
+        steered = True
+    drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
+    if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
+        zero, why = _neutral_value(state, drives)
+        words = f"{drives!r} drives the ship ahead. Of which shaft speed is a value of 1? Write factor, and offset"
+        state.ask(("n",), f"{words} = -factor * {zero:g}; in which dead band about it does the screw stop?")
+        extra = {"factor": 1.0} | ({"offset": -zero} if zero else {})
+        why = f"it drives the ship ahead (t value {push[drives]:.0f}){why}"
+        state.suggest(_command_of_column(state, drives, "propeller.n", used), drives, "rpm", 0.5, why, **extra)
+    return steered
+
+
+def _take_servo(state: State, name: str, effect: float, used: dict[str, int]) -> None:
+    """Suggest pulses or a share as an angle: 45 deg at the largest value is a guess, and asked."""
+    zero, why = _neutral_value(state, name)
+    full = 400.0 if _are_pulses(state.columns[name]) else float(np.abs(state.columns[name] - zero).max())
+    factor = float(f"{45.0 / full:.6g}")
+    state.turning[name] = float(np.sign(effect))
+    sign = {"sign": -1} if effect < 0 else {}
+    words = f"{name!r} turns the ship to {'starboard' if effect > 0 else 'port'} above {zero:g}: which angle is"
+    state.ask(
+        ("delta", "alpha"), f"{words} {zero + full:g}? 45 deg is a guess; is it a rudder, or an outboard that swivels?"
+    )
+    extra = {"factor": factor, "offset": -sign.get("sign", 1) * factor * zero, **sign}
+    column = _command_of_column(state, name, "rudder.delta", used)
+    state.suggest(column, name, "deg", 0.5, f"it turns the ship (t value {abs(effect):.0f}){why}", **extra)
+
+
+def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
+    """Suggest two columns as screws to port and to starboard, whose difference turns the ship."""
+    turned = "starboard" if effect > 0 else "port"
+    by_name = state.side_of(pair[0]) is not None
+    why = f"{'by its side; ' * by_name}the difference turns the ship to {turned} (t value {abs(effect):.0f})"
+    both, units = f"{pair[0]!r} and {pair[1]!r}", {unit_in_name(name, "rev/s") for name in pair}
+    known = len(units) == 1 and units <= UNITS["rev/s"].keys()
+    zeros = {name: _neutral_value(state, name) for name in pair}
+    if not known:
+        words = f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor"
+        state.ask(("n",), words)
+        if not all(why for _, why in zeros.values()):
+            words = f"which value of {both} is a stopped screw? 0 is a guess: write offset = -factor * value"
+            state.ask(("n",), words)
+    if not by_name:
+        state.ask(("n",), f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard")
+    for side, name in zip(("port", "starboard"), pair, strict=True):
+        zero, seen = zeros[name]
+        extra = {} if known else {"factor": 1.0} | ({"offset": -zero} if zero else {})
+        unit = str(units.copy().pop()) if known else "rpm"
+        state.suggest(f"{side}.n", name, unit, LIKELY if known else 0.5, why + seen * (not known), **extra)
+    if effect < 0:
+        words = f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?"
+        state.find("sides of the screws", pair, 0.6, words)
+
+
+def _neutral_value(state: State, name: str) -> tuple[float, str]:
+    """The value of a column at which the ship is at rest, else the middle of pulses, else 0; and why."""
+    values = state.columns[name]
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    speed = np.abs(state.chosen.change(state.position)) / span
+    still = values[state.chosen.first[speed < 0.05 * np.quantile(speed, 0.9)]]
+    usual = float(np.median(still)) if len(still) >= 5 else 0.0
+    if len(still) >= 5 and float(np.median(np.abs(still - usual))) < 0.02 * float(np.ptp(values)):
+        return usual, f"; {usual:g} while the ship is at rest"
+    return (1500.0, "; 1500 is the middle of a servo") if _are_pulses(values) else (0.0, "")
+
+
+def _are_pulses(values: Array) -> bool:
+    """Whether a column may be the pulses of a servo [us]."""
+    running = values[values != 0.0]  # 0 is no pulse
+    return bool(len(running) and PULSES[0] < running.min() and running.max() < PULSES[1] and np.ptp(running) > 20)
+
+
+def twin_columns(state: State) -> list[tuple[str, str]]:
+    """The pairs of free columns, port and starboard, whose names are equal but for the side, and that move apart."""
+    sides: dict[tuple[str, ...], dict[str, str]] = {}
+    for name in state.free():
+        side = state.side_of(name)
+        if side in ("port", "starboard"):
+            key = tuple(
+                part for part in name_parts(name) if state.side_of(f"x {part}") != side and part not in ("l", "r")
+            )
+            sides.setdefault(key, {}).setdefault(side, name)
+    pairs = [(pair["port"], pair["starboard"]) for pair in sides.values() if len(pair) == 2]
+    columns = state.columns
+    return [
+        pair
+        for pair in pairs
+        if np.ptp(columns[pair[0]] - columns[pair[1]]) > 0.2 * max(np.ptp(columns[name]) for name in pair) > 0
+    ]
+
+
+def _says_actuator(state: State, name: str) -> bool:
+    """Whether a name says an order, a throttle or per cent, or its numbers are pulses."""
+    said = is_order(name) or bool(OF_ACTUATORS & {*name_parts(name)}) or unit_in_name(name, "rev/s") == "%"
+    return said or _are_pulses(state.columns[name])
+
+
+def _may_be_actuator(state: State, name: str) -> bool:
+    """Whether a name says an actuator or nothing at all, and no unit of another quantity."""
+    fit, said = meaning_scores(name), _says_actuator(state, name)
+    foreign = unit_of_another(name, "n") is not None or (fit.get("", 0.0) >= STRONG and not said)
+    return not foreign and (said or not fit)
+
+
+# --- names and units ---
 
 
 def likely_unit(state: State, name: str, signal: str) -> str:

@@ -20,7 +20,6 @@ TURNS = (360.0, 2 * np.pi, 400.0, 3600.0, 36000.0, 6400.0)  # a whole turn in de
 GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
 WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
-FEW = 30  # values: fewer may be round by chance
 HOLE = 3.0  # times the usual step
 WILD, RARE = 5.0, 0.03  # times the larger rates, and share of the windows at most: then it is no turn of a ship
 LIVELY = 0.1  # of the larger changes over a window: in one of less nothing happens
@@ -103,13 +102,6 @@ def fit_without_outliers(seen: Complex, integrated: Complex) -> Fit:
     return fit_scale(seen[keep], integrated[keep])
 
 
-def course_agreement(track: Complex, psi: Array) -> complex:
-    """The mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
-    turned = track * np.exp(-1j * psi)
-    size = float(np.sum(np.abs(turned)))
-    return complex(np.sum(turned)) / size if size > 0 else 0j
-
-
 def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Unwrap an angle that jumps at a whole turn; replace false samples within a jump.
 
@@ -158,25 +150,36 @@ def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> flo
 
     t, r, order : (N,), r [rad/s]. duration : of the windows [s].
     """
-    rows, design, change = yaw_regression(t, r, order, duration)
-    if len(rows) < 12 or np.ptp(order) == 0.0:
-        return 0.0
+    return float(order_effects(t, r, order[None], duration)[0])
+
+
+def order_effects(t: Array, r: Array, orders: Array, duration: float = 4.0) -> Array:
+    """The t values (K,) of the effects of several orders (K, N) at once, as of `order_effect`."""
+    count = len(orders)
+    rows, design, change = yaw_regression(t, r, orders, duration)
+    if len(rows) < 12 or np.any(np.ptp(orders, axis=1) == 0.0):
+        return np.zeros(count)
     solution, errors, _ = solve_least_squares(design, change)
-    return float(solution[0] / errors[0]) if 0.0 < errors[0] < np.inf else 0.0
+    seen = (errors > 0.0) & np.isfinite(errors)
+    return np.where(seen, solution / np.where(seen, errors, 1.0), 0.0)[:count]
 
 
 def yaw_regression(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
-    """First rows (W,), columns (W, 3), left side (W,) of r' = a order + b r + c over windows without jumps of r."""
+    """First rows (W,), columns (W, K + 2), left side (W,) of r' = a order + b r + c over windows without jumps of r.
+
+    order : (N,), or several (K, N).
+    """
     chosen = row_windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = RowWindows(chosen.first[::thin], chosen.last[::thin])
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
-    signals, stretch = (cumulative_integral(t, order), cumulative_integral(t, r), t, r), _stretch_numbers(t)
+    orders = [cumulative_integral(t, one) for one in np.atleast_2d(order)]
+    signals, stretch = (*orders, cumulative_integral(t, r), t, r), _stretch_numbers(t)
     smooth = [_moving_mean(x, width, stretch) for x in signals]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
     design = np.stack(columns, axis=1)
     wild = np.zeros(len(change), dtype=bool)
-    for one in (change, design[:, 1]) if len(change) else ():
+    for one in (change, design[:, -2]) if len(change) else ():
         wild |= np.abs(one) > WILD * np.percentile(np.abs(one), 95)
     tame = ~wild | (np.sum(wild) > RARE * len(wild))
     return chosen.first[tame], design[tame], change[tame]
@@ -278,35 +281,6 @@ def interpolated_share(values: Array) -> float:
     return float(np.mean(np.abs(second[moving]) < 1e-9 * scale))
 
 
-def value_lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
-    """The multiplier in [low, high] that makes values round, how well (0 to 1), and the number of values used.
-
-    R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x are whole multiples of the quantum, about N^-1/2 else.
-    Values equal in two rows are used, for these are not interpolated; if they are few, all.
-    """
-    still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
-    asked = still if len(still) >= FEW else np.unique(values)[:400]
-    if len(asked) < FEW or _roundness_of(asked, np.ones(1), 1e-4)[0] > 0.8:  # round already: nothing was converted
-        return 0.0, 0.0, len(asked)
-    for quantum in (0.1, 0.01):
-        if low * float(np.ptp(asked)) < 20 * quantum:
-            continue  # too few multiples to be missed
-        step = quantum / 8 / float(np.abs(asked).max())
-        multipliers = np.arange(low, high, step)
-        best = multipliers[np.argmax(_roundness_of(asked[:: max(1, len(asked) // 60)], multipliers, quantum))]
-        finer = best + np.linspace(-step, step, 101)
-        sizes = _roundness_of(asked, finer, quantum)
-        if sizes.max() > 0.8:
-            return float(finer[np.argmax(sizes)]), float(sizes.max()), len(asked)
-    return 0.0, 0.0, len(asked)
-
-
-def _roundness_of(values: Array, multipliers: Array, quantum: float) -> Array:
-    """Return R, the roundness from 0 to 1, for every multiplier, (K,)."""
-    phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
-    return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
-
-
 def spike_rows(values: Array) -> NDArray[np.bool_]:
     """The rows (N,) of a signal that leave it and come back within two rows, as no ship and no order does.
 
@@ -387,7 +361,7 @@ def _fill_column(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
-    """The length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
+    """The length of windows [s] for this ship: about a radian of its usual turning, `WINDOW` at most.
 
     t (N,) [s], psi (N,) [rad].
     """

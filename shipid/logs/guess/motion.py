@@ -1,410 +1,350 @@
-"""Choose velocities and yaw rate: the columns whose integrals are the track and the heading, with unit, frame, sign."""
+"""Draft the motion that the search finds: position, heading, velocities, yaw rate, what is odd and what is asked."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shipid.data.dataset import Array
 from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, names_another, unit_in_name
+from shipid.logs.guess.clues import State, si_unit, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
-from shipid.logs.guess.words import is_order, meaning_scores
+from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
+from shipid.logs.guess.search import (
+    LENGTHS,
+    PLAIN,
+    WAYS,
+    Axes,
+    Frame,
+    Motion,
+    Sense,
+    Velocity,
+    length_unit,
+    local_plane,
+    rates_of_ais,
+    search_motion,
+)
+from shipid.logs.guess.settings import SETTINGS
+from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores
 from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
-from shipid.physics.signals import rows_of_role
+from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
 
-CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
-LEFT, NAMED_LEFT = 0.1, 0.5  # unexplained share of the track, at most: of columns without fitting names, and with
-SAME = 0.8  # ratio of two unexplained shares, above which neither is better
-MISLED = 0.1  # unexplained share of the heading, and distance from a unit, at most: of a rate with a misleading name
-FAR = 2.0  # a factor that no sensor has
+ABREAST = np.radians(0.5)  # by which two headings of one ship may differ
 FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes or turns harder, no trial is slower
 FROUDE = 4.0  # U / sqrt(g L): nothing that is steered in trials is faster for its length
-OFF_UNIT = 0.15  # relative distance of a fitted scale from a unit
-PLAIN, OFF_RARE = ("m/s", "kn", "km/h"), 0.03  # units that logs have, and the same distance for a unit that few have
-WHOLE, OFF_AIS = 0.9, 0.2  # share of whole numbers, at least; distance from the unit, of rates that AIS has coded
-ALONG = 0.1  # share of the track that a speed along the heading may leave unexplained
+FAR = 2.0  # a factor that no sensor has
 TURNED, ONE_WAY = np.radians(0.5), 0.9  # of a track against a course, at least; mean of its directions, at most
-EXCHANGED, INWARD = 0.2, 0.5  # ratio of unexplained shares, at most; correlation of a drift into the turn, at least
 
 
-@dataclass(frozen=True)
-class Velocities:
-    """A hypothesis: two columns as `earth`-fixed, `body`-fixed, or `mirrored` (the second is positive to port).
+def choose_motion(state: State, file: Path, frame: Frame | None = None) -> None:
+    """Choose position, heading, velocities and yaw rate, in the frame of the log where it is known.
 
-    fit : track = scale * integral. named : how well the names fit, 0 to 1. path : the integral, (N,).
+    Raises DataError if no column can be position or heading, or if the ship does not move as in that frame.
     """
-
-    fit: Fit
-    first: str
-    second: str
-    frame: str
-    named: float
-    path: Complex
-
-    @property
-    def cost(self) -> float:
-        """Unexplained share of the track, less for fitting names."""
-        return (self.fit.left + 0.003) / (0.25 + self.named)
+    motions = search_motion(state, file, frame)
+    best = motions[0]
+    _ask_about_names(state, best)
+    _ask_about_rivals(state, motions)
+    _take_pose(state, best)
+    if best.velocity is not None:
+        _take_velocities(state, best, best.velocity)
+    _take_rate(state, best)
 
 
-def choose_velocities(state: State) -> None:
-    """Choose the two velocity columns, or speed and course over ground, whose integral fits the track best."""
-    seen = state.chosen.change(state.position)
-    ranked = sorted(_velocity_hypotheses(state, seen), key=lambda entry: entry.cost)
-    named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
-    bound = min(LEFT, 0.7 * min((entry.fit.left for entry in ranked), default=1.0)) if state.numbered else 0.2
-    if not named and _choose_speed_and_course(state, seen, bound):
-        return
-    least = min((entry.fit.left for entry in ranked), default=1.0)
-    best = next(iter(ranked), None)
-    if best is None or best.fit.left > (NAMED_LEFT if best.named >= 0.45 else LEFT):
-        return
-    plain = [entry for entry in named if entry.frame == "body"]
-    for better in (named[:1], plain[:1]):
-        if better and better[0].fit.left < CLEAR * least + 1e-6:
-            best = better[0]
-    swapped = best.first in state.called("v") and best.second in state.called("u")
-    if best.named < 0.45 and not state.numbered and not swapped:
-        names = f"{best.first!r} and {best.second!r}"
-        state.find(
-            "velocities under other names",
-            (best.first, best.second),
-            0.6,
-            f"{names} are not named as velocities, but their integral is the track",
-        )
-    _take_velocities(state, _side_of_sway(state, best, ranked, seen), ranked)
+# --- position and heading ---
 
 
-def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
-    """Yield every ordered pair of columns as earth-fixed, as body-fixed, and as body-fixed with v to port."""
-    words = ("u", "v", "velocity_north", "velocity_east")
-    named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
-    free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:20]
-    turn = np.exp(1j * state.psi)
-    earth = {name: evidence.integrate_rate(state.t, state.columns[name]) for name in free}
-    body = {name: evidence.integrate_rate(state.t, state.columns[name] * turn) for name in free}
-    for first in free:
-        for second in free:
-            if first == second:
-                continue
-            ahead, north = ((meaning_scores(first).get(word, 0.0)) for word in ("u", "velocity_north"))
-            abeam, east = ((meaning_scores(second).get(word, 0.0)) for word in ("v", "velocity_east"))
-            for frame, path, score in (
-                ("earth", earth[first] + 1j * earth[second], max(min(north, east), 0.5 * min(ahead, abeam))),
-                ("body", body[first] + 1j * body[second], min(ahead, abeam)),
-                ("mirrored", body[first] - 1j * body[second], 0.9 * min(ahead, abeam)),
-            ):
-                result = evidence.fit_without_outliers(seen, state.chosen.change(path))
-                known = _is_speed_unit(result.scale)
-                if result.scale > 0 and (score >= 0.45 or known):
-                    yield Velocities(result, first, second, frame, score, path)
+def _take_pose(state: State, best: Motion) -> None:
+    pose, axes = best.pose, best.axes
+    place, sense = pose.place, best.axes.sense(pose.sense)
+    plane = axes.place(local_plane(state, place.first, place.second, place.on_globe))
+    sources = (place.second, place.first) if axes.swap else (place.first, place.second)
+    for source, sign in zip(sources, (axes.north, axes.east), strict=True):
+        if sign < 0:
+            state.negate(source)
+    length = "deg" if place.on_globe else length_unit(*sources)
+    sure = 0.99 * (1.0 - min(0.5, 5.0 * pose.misfit**2))
+    why = f"course over ground keeps to the heading (agreement {1.0 - pose.misfit:.3f} of 1)"
+    for name, source in zip(("latitude", "longitude") if place.on_globe else ("north", "east"), sources, strict=True):
+        state.suggest(name, source, length, sure, why)
+    state.position = plane
+    _report_axes(state, best, sources, sense)
+    named = meaning_scores(pose.heading)
+    if not state.numbered and named.get("psi", 0.0) <= named.get("course", 0.0):
+        sure = min(sure, 0.5)
+        if pose.heading in state.all_called("psi"):
+            words = f"is {pose.heading!r} the heading, or the course over ground? By its name it may be either"
+            state.ask(("psi",), words)
+    if pose.turn in TURNS:
+        what = f"a whole turn is {pose.turn:g}: {TURNS[pose.turn]}, with which it keeps to the track"
+        set_scale(state, pose.heading, 360.0 / pose.turn, what)
+    angle, false = evidence.heal_angle(state.columns[pose.heading], 2 * np.pi / to_si(pose.unit, "psi"), state.t)
+    if false.any():
+        across = "360" if pose.unit == "deg" else "2 pi"
+        sentence = f"{int(false.sum())} steps of {pose.heading!r} lie between two headings across {across}"
+        repair = {"kind": "wrap_interpolation", "columns": ["psi"], "threshold": 20.0, "unit": "deg"}
+        state.find("interpolation across 360", (pose.heading,), 0.98, sentence, repair)
+    extra: dict[str, Any] = {"wrap": True} | ({"sign": -1} if sense.sign < 0 else {})
+    if sense.quarter:
+        extra["offset"] = 90.0 * sense.quarter if pose.unit == "deg" else round(np.pi / 2 * sense.quarter, 9)
+    state.suggest("psi", pose.heading, pose.unit, sure, f"{why}; in {pose.unit} rather than another unit", **extra)
+    state.psi = sense.direction(angle * to_si(pose.unit, "psi"))
 
 
-def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
-    """The hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn, v r < 0."""
-    if best.frame == "earth":
-        return best
-    other = next(
-        (
-            e
-            for e in ranked
-            if (e.first, e.second) == (best.first, best.second) and e.frame not in (best.frame, "earth")
-        ),
-        None,
-    )
-    if other is None:
-        return best
-    turned = state.chosen.change(np.asarray(np.exp(1j * state.psi)))
-    left = {}
-    for entry in (best, other):
-        change = state.chosen.change(entry.path)
-        keep = evidence.windows_without_outliers(seen, change)
-        left[entry.frame] = evidence.fit_with_arm(seen[keep], change[keep], turned[keep])[0].left
-    by_track = min((best, other), key=lambda entry: left[entry.frame])
-    ratio = min(left.values()) / max(max(left.values()), 1e-12)
-    r = np.gradient(state.psi, state.t)
-    drift = float(np.mean(_window_means(state, state.columns[best.second]) * _window_means(state, r)))
-    by_drift = {"body": drift < 0, "mirrored": drift > 0}
-    if ratio < SAME and by_drift[by_track.frame]:
-        return by_track
-    if ratio < 0.5 * SAME:
-        return by_track
-    simple = min((best, other), key=lambda entry: entry.fit.left)
-    likely = best if by_drift[best.frame] else other
-    if likely is not simple or ratio < SAME:
+def _report_axes(state: State, best: Motion, sources: tuple[str, str], sense: Sense) -> None:
+    """Note axes and a heading that count otherwise than usual, and ask where another reading is nearly as likely."""
+    pose, axes = best.pose, best.axes
+    agreement = 1.0 - pose.misfit
+    words = _reading_in_words(best, axes)
+    if pose.astern:
+        state.astern = True
+        shafts = [name for name in state.called("n") if np.median(state.columns[name]) < 0.0]
+        why = f"{shafts[0]!r} is negative" if shafts else "another heading would not fit"
+        if best.velocity is not None and best.velocity.kind == "body":
+            why = f"{best.velocity.first!r} along the heading gives the track"
+        said = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
+        state.find("astern", (pose.heading,), 0.8, said)
+    elif sense.quarter == 2 and sense.sign > 0:
+        said = f"does the ship go astern, or has {pose.heading!r} another zero? If it goes astern, take the offset out"
+        state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {said}")
+    if (axes != Axes() or sense != Sense()) and not best.settled.startswith("--"):
+        shown = f", as {best.settled!r} shows" if best.settled else ""
+        state.find("frame", (*sources, pose.heading), agreement, f"course and heading agree with {words}{shown}")
+    if pose.place.on_globe and axes != Axes():
+        said = " and ".join(f"{name!r} to {way}" for name, way in zip(sources, _ways(axes), strict=True))
         state.ask(
-            ("v",),
-            f"is {best.second!r} positive to starboard? It is drafted so that she drifts out of her turns, as ships "
-            "do near midships; the track does not settle it",
+            ("latitude", "longitude", "psi"), f"does the log count {said}? Else {pose.heading!r} counts otherwise"
         )
-    return likely
+    elif best.rivals:
+        sides = "; port and starboard change places" * any(axes.hand != one.hand for one in best.rivals)
+        said = ", or ".join([f"is {words}", *(_reading_in_words(best, one) for one in best.rivals)])
+        words = f"{said}? Motion is the same in all{sides}: answer with --frame ned, enu, zup or ros"
+        state.ask(("psi", "north", "east"), words)
 
 
-def _window_means(state: State, values: Array) -> Array:
-    """A signal as means over the windows, less its mean, (W,)."""
-    span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    means = state.chosen.change(evidence.integrate_rate(state.t, values)).real / span
-    return np.asarray(means - np.mean(means))
+def _ways(axes: Axes) -> list[str]:
+    """To where the first and the second axis point."""
+    ways = [WAYS[0 if axes.north > 0 else 2], WAYS[1 if axes.east > 0 else 3]]
+    return ways[::-1] if axes.swap else ways
 
 
-def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -> None:
-    fit, first, second, frame = best.fit, best.first, best.second, best.frame
-    pair = {first, second}
-    runner = min(
-        (e.fit for e in ranked if e.frame != frame and {e.first, e.second} == pair),
-        key=lambda one: one.left,
-        default=None,
-    )
-    unit, rest = _fitted_speed_unit(fit, (first, second), state)
-    factor = to_si(unit, "u")
-    contrast = 1.0 - fit.left / runner.left if runner is not None and runner.left > 0 else 1.0
-    confidence = float(np.clip(0.6 + 0.4 * contrast, 0.0, 0.99)) * (1 - min(0.5, fit.left))
-    swapped = first in state.all_called("v") and second in state.all_called("u")
-    confidence = confidence if best.named >= 0.45 or state.numbered or swapped else min(confidence, 0.59)
-    if frame == "earth" and contrast < 0.2:
-        state.ask(
-            ("u", "v"), f"are {first!r} and {second!r} north and east velocities, or along and across the heading?"
-        )
-    fixed = "earth" if frame == "earth" else "body"
-    why = f"integrated as {fixed}-fixed [{unit}] they leave {100 * fit.left:.2g} % of the track unexplained"
-    if runner is not None:
-        why += f", otherwise {100 * runner.left:.2g} %"
-    in_unit = state.columns[first] * factor, state.columns[second] * factor
-    extra_v: dict[str, Any] = {}
-    if frame == "earth":
-        extra = {"frame": "earth"}
-        if meaning_scores(first).get("u", 0.0) > meaning_scores(first).get(
-            "velocity_north", 0.0
-        ) and first in state.all_called("u"):
-            state.find(
-                "earth-fixed velocities",
-                (first, second),
-                confidence,
-                f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east",
-            )
+def _reading_in_words(best: Motion, axes: Axes) -> str:
+    place, sense, ways = best.pose.place, axes.sense(best.pose.sense), _ways(axes)
+    side = "starboard" if sense.sign > 0 else "port"
+    counts = f"{best.pose.heading!r} counted to {side} from {WAYS[sense.quarter % 4]}"
+    return f"{place.first!r} to {ways[0]}, {place.second!r} to {ways[1]}, {counts}"
+
+
+def _ask_about_names(state: State, best: Motion) -> None:
+    """Ask about what names say of position and heading: a magnetic compass, set points, ship lengths, no agreement."""
+    pose = best.pose
+    first, second = pose.place.first, pose.place.second
+    if is_magnetic(pose.heading):
+        words = f"{pose.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
+        state.ask(("psi", "v"), f"{words} A `heading_offset` is one for all courses")
+    if pose.misfit > SETTINGS.poor and not state.numbered:
+        words = f"course and heading agree badly (misfit {pose.misfit:.2f}): are {first!r}, {second!r} the position"
+        state.ask(("psi", "north", "east", "u", "v", "r"), f"{words} and {pose.heading!r} the heading?")
+    lengths = [name for name in (first, second) if LENGTHS.search(name)]
+    if lengths:
+        words = f"{' and '.join(map(repr, lengths))} are in ship lengths by their names"
+        state.ask(("north", "east", "u", "v"), f"{words}: write factor = the length in m")
+    references = [name for name in (first, second, pose.heading) if may_be_measured(name)]
+    if references:
+        words = f"is {', '.join(map(repr, references))} measured, or a set point? By the name it may be either"
+        state.ask(("psi", "north", "east", "latitude", "longitude"), words)
+
+
+def _ask_about_rivals(state: State, motions: list[Motion]) -> None:
+    """Ask where another column may be the heading nearly as well, and where a second heading differs from the first."""
+    best, heading = motions[0], motions[0].pose.heading
+    found = best.velocity
+    others = [one for one in motions[1:] if one.pose.heading != heading and one.cost < best.cost + SETTINGS.close]
+    other = found.second if found is not None and found.kind == "course" and found.unsure else ""
+    other = others[0].pose.heading if others and state.numbered else other
+    if other:
+        words = f"is {heading!r} the heading and {other!r} the course, or are they exchanged? No ship drifts into its"
+        about = ("psi", "north", "east", "u", "v", "r", "speed", "course")
+        state.ask(about, f"{words} turns; a run in a known current, or the column of a gyro, tells")
+    named = [name for name in state.all_called("psi") if not is_order(name) and not is_magnetic(name)]
+    named = [name for name in named if meaning_scores(name)["psi"] > meaning_scores(name).get("course", 0.0)]
+    angles = {
+        name: np.exp(1j * to_si(unit_in_name(name, "rad") or best.pose.unit, "psi") * state.columns[name])
+        for name in named
+    }
+    for name in named if heading in named else ():
+        apart = np.angle(angles[name] * np.conj(angles[heading]))
+        usual = float(np.median(apart))
+        if ABREAST < abs(usual) < np.pi / 4 and float(np.median(np.abs(apart - usual))) < ABREAST:
+            words = f"{heading!r} and {name!r} differ by {np.degrees(abs(usual)):.1f} deg: which is the heading?"
+            state.ask(("psi", "v"), f"{words} {heading!r} is drafted, as it keeps closer to the track")
+
+
+# --- velocities ---
+
+
+def _take_velocities(state: State, best: Motion, found: Velocity) -> None:
+    axes, fit = best.axes, found.fit
+    first, second = found.first, found.second
+    sources = (first,) if found.kind == "course" else (first, second)
+    unit, part = _unit_of_speed(state, fit, sources, found.kind == "course")
+    factor = to_si(unit, "u") * part
+    if part != 1.0:
+        set_scale(state, first, part, f"whole numbers of {KNOTS[part]}")
+    ground = axes.place(found.ground) * factor
+    heading = np.exp(1j * state.psi)
+    confidence = 0.99 * (1 - min(0.5, fit.left))
+    leaves = f"leaves {100 * fit.left:.2g} % of the track unexplained"
+    if found.kind == "course":
+        turned = "rad" if found.turn < 7.0 else "deg"
+        why = f"along the course [{turned}] it {leaves}"
+        if found.turn in TURNS:
+            set_scale(state, second, 360.0 / found.turn, f"a whole turn is {found.turn:g}: {TURNS[found.turn]}")
+        sense = axes.sense(found.sense)
+        extra: dict[str, Any] = {"wrap": True} | ({"sign": -1} if sense.sign < 0 else {})
+        if sense.quarter:
+            extra["offset"] = round(sense.quarter * np.pi / 2 / to_si(turned, "psi"), 9)
+        state.suggest("speed", first, unit, 0.9, why)
+        state.suggest("course", second, turned, 0.9, why, **extra)
     else:
-        extra = {}
-        if frame == "mirrored":
-            state.find(
-                "wrong sign of v",
-                (second,),
-                confidence,
-                f"{second!r} is positive to port: the track is met with its sign changed",
-            )
-            extra_v = {"sign": -1}
-        if swapped:
-            state.find(
-                "u and v swapped", (first, second), confidence, f"{first!r} is along the heading, {second!r} across it"
-            )
-    state.suggest("u", first, unit, confidence, why, **extra)
-    state.suggest("v", second, unit, confidence, why, **extra, **extra_v)
-    velocity = in_unit[0] + 1j * in_unit[1] * (-1 if frame == "mirrored" else 1)
-    turn = np.exp(1j * state.psi)
-    state.body = np.asarray(velocity / turn if frame == "earth" else velocity)
+        why = f"integrated as {found.kind}-fixed [{unit}] it {leaves}"
+        if found.named < 0.45 and not state.numbered:
+            confidence = min(confidence, 0.59)
+        _suggest_two(state, best, found, unit, confidence, why)
+    state.velocity, state.body = ground, np.asarray(ground / heading)
     fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
-    along = "" if frame == "earth" else next((one.source for one in state.suggestions if one.name == "psi"), "psi")
-    ground = velocity if frame == "earth" else velocity * turn
-    fit, state.velocity = _as_track(state, fit, np.asarray(ground), (first, second), along=along)
-    _report_factor(state, rest, fit, (first, second), unit)
+    fit, state.velocity = _as_track(state, fit, ground, (second,) if found.kind == "course" else sources, found.kind)
+    _report_factor(state, fit, sources, unit, ("speed",) if found.kind == "course" else ("u", "v"))
 
 
-def _fitted_speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
-    """The unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
-    units = UNITS["m/s"]
-    unit = min(PLAIN, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
-    written = unit_in_name(sources[0], "m/s")
-    rare = next((name for name in units if name not in PLAIN and abs(fit.scale / units[name] - 1) < OFF_RARE), None)
-    clocked = next(
-        (one for one in ((written,) if written else PLAIN) if _clock_unit(state, fit.scale / units[one])), None
-    )
-    if clocked and (rare is None or not is_possible(state)):
-        return clocked, True
-    if clocked and rare != written:
-        other = _clock_unit(state, fit.scale / units[clocked])
-        words = f"in {rare} and the clock in {state.clock_unit}, or in {clocked} and the clock in {other}"
-        state.ask(("t", "u", "v", "speed"), f"is {sources[0]!r} {words}? The track is the same")
-    near = written in PLAIN and abs(fit.scale / units[written] - 1) < OFF_UNIT  # a factor, and no mile per hour
-    if rare and abs(fit.scale / units[unit] - 1) > OFF_UNIT / 2 and not near:
-        unit = rare
-    if (
-        written is not None
-        and abs(fit.scale / units[written] - 1) < OFF_UNIT
-        and abs(fit.scale / units[unit] - 1) > 0.05
-    ):
-        unit = written
-    if unit != (written or (unit if quiet and unit in PLAIN else "m/s")) and abs(fit.scale / units[unit] - 1) < 0.08:
-        word = "knots" if "kn" in (unit, written) else "speed unit"
-        wanted = f"the name says {written}" if written else "nothing says so"
-        state.find(
-            word,
-            sources,
-            0.95,
-            f"the track is {fit.scale:.3f} times the integral: {sources[0]!r} is in {unit} ({wanted})",
+def _suggest_two(state: State, best: Motion, found: Velocity, unit: str, confidence: float, why: str) -> None:
+    """Suggest two columns as u and v: of the axes of the log, or of the ship."""
+    first, second, axes = found.first, found.second, best.axes
+    if found.kind == "earth":
+        signs = (axes.north, axes.east * found.side) if not axes.swap else (axes.north * found.side, axes.east)
+        pair = (second, first) if axes.swap else (first, second)
+        for name, source, sign in zip(("u", "v"), pair, signs, strict=True):
+            state.suggest(name, source, unit, confidence, why, frame="earth", **({"sign": -1} if sign < 0 else {}))
+        return
+    sign = found.side * axes.hand
+    if found.unsure:
+        words = (
+            f"is {second!r} positive to {'starboard' if sign > 0 else 'port'}? It is drafted so that the ship drifts"
         )
-    elif written is not None and abs(fit.scale / units[unit] - 1) >= 0.08:
-        unit = written
-    return unit, abs(fit.scale / units[unit] - 1) > 0.004
+        state.ask(("v",), f"{words} out of its turns, as ships do near midships; the track does not settle it")
+    state.suggest("u", first, unit, confidence, why)
+    state.suggest("v", second, unit, confidence, why, **({"sign": -1} if sign < 0 else {}))
 
 
-def _is_speed_unit(scale: float) -> bool:
-    away = {unit: abs(scale / factor - 1) for unit, factor in UNITS["m/s"].items()}
-    return any(distance < (OFF_UNIT if unit in PLAIN else OFF_RARE) for unit, distance in away.items())
-
-
-def _clock_unit(state: State, ratio: float) -> str | None:
-    """The unit of the clock with which the track would be the integral, if it is `ratio` times the integral."""
-    if state.clock_unit == "date":
-        return None
+def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool) -> tuple[str, float]:
+    """The likeliest unit by the scale and the name, and the part of it that is counted; another clock is asked."""
+    name = sources[0]
+    written = unit_in_name(name, "m/s")
+    whole = quiet and float(np.mean(state.columns[name] % 1 == 0)) > 0.1
     now = DAY if is_dated(state.clock_unit) else to_si(state.clock_unit, "t")
-    others = {unit: factor / now for unit, factor in UNITS["s"].items() if not is_dated(unit) and factor != now}
-    return next((unit for unit, factor in others.items() if abs(ratio / factor - 1) < OFF_RARE), None)
+    clocks = {state.clock_unit: 1.0}
+    if state.clock_unit != "date":
+        clocks |= {unit: factor / now for unit, factor in UNITS["s"].items() if not is_dated(unit) and factor != now}
+    costs: dict[tuple[str, float, str], float] = {}
+    for unit, factor in UNITS["m/s"].items():
+        for part in (1.0, *KNOTS) if unit == "kn" and whole else (1.0,):
+            for clock, times in clocks.items():
+                usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.rare_unit
+                cost = (0.0 if written == unit else SETTINGS.rare_unit + 2.0) if written else usual
+                cost += SETTINGS.usual_unit * (part != 1.0) + SETTINGS.other_clock * (times != 1.0)
+                off = np.log(fit.scale / (factor * part * times)) / (SETTINGS.off_unit if times == 1.0 else 0.02)
+                costs[unit, part, clock] = float(cost + off**2 / 2)
+    ranked = sorted(costs, key=costs.__getitem__)
+    unit, part, clock = ranked[0]
+    if costs[ranked[0]] > 20.0:  # a factor of no unit
+        return written or ("kn" if name in state.scaled else "m/s"), 1.0
+    rivals = [one for one in ranked[1:] if costs[one] <= costs[ranked[0]] + SETTINGS.close and one[2] != clock]
+    for other_unit, _, other in [ranked[0]] if clock != state.clock_unit else rivals[:1]:
+        words = f"is the clock in {other}, with {name!r} in {other_unit}? The draft says {state.clock_unit}"
+        state.ask(("t", "u", "v", "speed"), f"{words}: the track is {fit.scale:.4g} times the integral of {name!r}")
+    return unit, part
 
 
-def _report_factor(
-    state: State, remains: bool, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...] = ("u", "v")
-) -> None:
+def _report_factor(state: State, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...]) -> None:
+    """Report a factor of the speeds that remains beside their unit."""
     pair = " and ".join(repr(source) for source in sources)
     begins = f"the track is {fit.scale:.4g} times the integral of {pair} in {unit}"
-    if (other := _clock_unit(state, fit.scale)) is not None:
-        state.find(
-            "clock unit",
-            sources,
-            0.9,
-            f"{begins}: a clock in {other}, not {state.clock_unit}, or another unit of the positions would explain it",
-        )
-        state.ask(("t", *columns), f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}")
-        return
     if not 1 / FAR <= fit.scale <= FAR:
-        state.find(
-            "factor", sources, 0.6, f"{begins}: the unit of the clock, of the positions or of the speeds is another one"
-        )
-        state.ask(("t", *columns), f"are the units of the clock, of the positions and of {pair} right? {begins}")
-        return
-    per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
-    rounds = [evidence.value_lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
-    near = [entry for entry in rounds if entry[1] > 0.9]
-    if near and unit != "kn":
-        multiplier, _, count = max(near, key=lambda entry: entry[2])
-        factor = multiplier / per_knot
-        if abs(factor - fit.scale) < max(0.03, 3 * fit.error) and abs(factor - 1.0) > 1e-3:
-            sentence = (
-                f"{count} values are round in knots if these were divided by {multiplier:.4f}, not {per_knot:.4f}"
-            )
-            sentence += f" (the track says {fit.scale:.3f} +- {fit.error:.3f})"
-            repair = {"kind": "scale", "columns": list(columns), "factor": round(factor, 4)}
-            state.find("factor", sources, 0.95, sentence, repair)
+        if not any("t" in one.about for one in state.questions):
+            words = "the unit of the clock, of the positions or of the speeds is another one"
+            state.find("factor", sources, 0.6, f"{begins}: {words}")
+            state.ask(("t", *columns), f"are the units of the clock, of the positions and of {pair} right? {begins}")
         return
     off = abs(fit.scale - 1.0)
-    if not remains or not np.isfinite(fit.error) or off < max(3 * fit.error, 0.004):
-        return
-    sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
-    sentence = f"the track is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {pair} in {unit}"
-    repair = {"kind": "scale", "columns": list(columns), "factor": round(fit.scale, 4)}
-    state.find("factor", sources, sure, sentence, repair)
+    if np.isfinite(fit.error) and off > max(3 * fit.error, 0.004):
+        sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
+        repair = {"kind": "scale", "columns": list(columns), "factor": round(fit.scale, 4)}
+        state.find("factor", sources, sure, f"{begins} (+- {fit.error:.2g})", repair)
 
 
-def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
-    """Take speed and course over ground, if the log has them, instead of velocities.
-
-    bound : unexplained share of the track, at most.
-    """
-    speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
-    if state.numbered:
-        speeds = courses = state.eligible()
-    best: tuple[float, str, str, str, Fit, Complex] | None = None
-    for course in courses:
-        for turn in ("deg", "rad"):
-            way = np.exp(1j * state.angle(course, turn))
-            for speed in speeds:
-                if speed == course:
-                    continue
-                path = evidence.integrate_rate(state.t, state.columns[speed] * way)
-                fit = evidence.fit_without_outliers(seen, state.chosen.change(path))
-                score = 0.0 if state.numbered else meaning_scores(speed)["speed"] + meaning_scores(course)["course"]
-                cost = (
-                    (fit.left + 0.003)
-                    / (0.3 + score)
-                    * (0.7 if turn == (unit_in_name(course, "rad") or "deg") else 1.0)
-                )
-                known = _is_speed_unit(fit.scale)
-                if (
-                    (known or (score >= 1.5 and fit.scale > 0))
-                    and fit.left < bound
-                    and (best is None or cost < best[0])
-                ):
-                    best = (cost, speed, course, turn, fit, way)
-    if best is None:
-        return False
-    _, speed, course, turn, fit, way = best
-    unit, rest = _fitted_speed_unit(fit, (speed, course), state, quiet=True)
-    factor = to_si(unit, "u")
-    why = f"along the course [{turn}] it leaves {100 * fit.left:.2g} % of the track unexplained"
-    state.suggest("speed", speed, unit, 0.9, why)
-    state.suggest("course", course, turn, 0.9, why, wrap=True)
-    state.velocity = np.asarray(to_si(unit, "u") * state.columns[speed] * way)
-    state.body = np.asarray(state.velocity * np.exp(-1j * state.psi))
-    fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
-    if not _ask_heading_and_course(state, seen, speed, course, fit):
-        fit, state.velocity = _as_track(state, fit, state.velocity, (course,), turn)
-    _report_factor(state, rest, fit, (speed,), unit, ("speed",))
-    return True
-
-
-def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
-    """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course."""
-    assert state.body is not None
-    change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * state.psi)))
-    if evidence.fit_without_outliers(seen, change).left > EXCHANGED * fit.left:
-        return False
-    r = np.gradient(state.psi, state.t)
-    inward = np.corrcoef(_window_means(state, state.body.imag), _window_means(state, r))[0, 1]
-    if not inward > INWARD:
-        return False
-    heading = next((one.source for one in state.suggestions if one.name == "psi"), "psi")
-    state.ask(
-        ("psi", "course", "v"),
-        f"are {heading!r} and {course!r} exchanged? The ship moves along {heading!r}, and drifts into her turns"
-        f": no ship does. Then exchange them here",
-    )
-    return True
-
-
-def _as_track(
-    state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg", along: str = ""
-) -> tuple[Fit, Complex]:
+def _as_track(state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], kind: str) -> tuple[Fit, Complex]:
     """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it."""
     seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, velocity)))
     keep = evidence.windows_without_outliers(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
     if keep.sum() < 20 or abs(complex(np.mean(ran[keep] / np.abs(ran[keep])))) > ONE_WAY:
         return fit, velocity
-    angles = np.angle(seen[keep] * np.conj(ran[keep]))
-    rates = state.chosen.change(state.psi).real[keep]
+    angles, rates = np.angle(seen[keep] * np.conj(ran[keep])), state.chosen.change(state.psi).real[keep]
     design = np.stack([np.ones_like(rates), rates], axis=1)
     (angle, slope), *_ = np.linalg.lstsq(design, angles, rcond=None)
     parts = [float(np.mean(part)) for part in np.array_split(angles - slope * rates, 10)]
     error = 1.25 * float(np.std(parts)) / np.sqrt(len(parts))
     if not max(TURNED, 5 * error) < abs(angle) < np.pi / 4:
         return fit, velocity
-    names = " and ".join(map(repr, sources))
-    words = f"the track is turned by {np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg against {names}"
-    if along:
-        heading = next((one.unit for one in state.suggestions if one.name == "psi"), "rad")
-        words += f" along {along!r}: is the heading off, or the north of the positions another? Then write "
-        state.ask(("psi", "u", "v"), f"{words}offset = {angle / to_si(heading, 'psi'):.4g} ({heading}) for psi")
-        turn = np.exp(1j * angle)
-        return evidence.fit_scale(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
-    words += ": is their north another than that of the positions, as that of a map or of a compass?"
-    remedy = f"offset = {angle / to_si(unit, 'psi'):.4g} ({unit}) for course, and for psi, too, if it counts so"
-    remedy = f"Then write {remedy}" if len(sources) == 1 else "Then turn the positions, or these"
-    state.ask(("psi", "course", "u", "v"), f"{words} {remedy}")
+    degrees = f"{np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg"
+    words = f"the track is turned by {degrees} against {' and '.join(map(repr, sources))}"
+    units = {one.name: one.unit for one in state.suggestions}
+    if kind == "body":
+        unit = units.get("psi", "rad")
+        words += " along the heading: is the heading off, or the north of the positions another? Then write offset = "
+        state.ask(("psi", "u", "v"), f"{words}{angle / to_si(unit, 'psi'):.4g} ({unit}) for psi")
+    else:
+        words += ": is their north another than that of the positions, as that of a map or of a compass? Then "
+        unit = units.get("course", "deg")
+        remedy = (
+            f"write offset = {angle / to_si(unit, 'psi'):.4g} ({unit}) for course, and for psi, too, if it counts so"
+        )
+        remedy = remedy if kind == "course" else "turn the positions, or these"
+        state.ask(("psi", "course", "u", "v"), words + remedy)
     turn = np.exp(1j * angle)
     return evidence.fit_scale(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
+
+
+# --- yaw rate and clock ---
+
+
+def _take_rate(state: State, best: Motion) -> None:
+    found, called = best.rate, state.all_called("r")
+    if found is None:
+        free = [name for name in called if name in state.free()]
+        if free and float(np.std(state.chosen.change(state.psi))) < np.radians(0.5):
+            unit = unit_in_name(free[0], "rad/s") or "deg/s"
+            state.suggest("r", free[0], unit, 0.4, "by its name; the ship turns too little to see unit and sign")
+        elif free and not state.numbered:
+            words = f"{free[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
+            state.find("yaw rate does not fit", (free[0],), 0.6, words)
+        return
+    name, unit, fit = found.name, found.unit, found.fit
+    if unit == "ais" and (rates := rates_of_ais(state, name)) is not None:
+        missing = int(np.isnan(rate_of_ais(state.columns[name])).sum())
+        state.columns[name], state.units[name] = rates, "ais"
+        words = f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min"
+        state.find("unit of r", (name,), 0.9, words)
+        if missing:
+            words = f"{name!r} is 127, -127 or -128 in {missing} rows, with which AIS says no rate"
+            state.find("missing values", (name,), 0.95, words)
+    sign = (1 if fit.scale > 0 else -1) * best.axes.hand
+    confidence = 0.99 * (1 - min(0.5, fit.left))
+    why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
+    state.suggest("r", name, unit, confidence, why, **({"sign": -1} if sign < 0 else {}))
+    state.r = state.columns[name] * to_si(unit, "r") * sign
 
 
 def ship_pace(state: State) -> tuple[float, float]:
@@ -415,145 +355,33 @@ def ship_pace(state: State) -> tuple[float, float]:
     return float(np.percentile(speeds, 90)), float(np.percentile(speeds * rates, 90))
 
 
-def is_possible(state: State, length: float = np.inf) -> bool:
-    """Whether a ship of this length [m] may go and turn as this one does by the drafted clock."""
-    speed, across = ship_pace(state)
-    return SLOWEST < speed < min(FASTEST, FROUDE * np.sqrt(GRAVITY * length)) and across < HARDEST
-
-
 def check_clock(state: State, length: float = np.inf) -> None:
     """Ask for the unit of the clock where no ship goes so fast, or so slowly. length : of the ship [m], if known."""
-    if any("t" in question.about for question in state.questions) or _ask_clock_by_speed(state):
-        return
-    if is_possible(state, length):
-        return
     speed, across = ship_pace(state)
-    state.ask(
-        ("t", "north", "east"),
+    possible = SLOWEST < speed < min(FASTEST, FROUDE * np.sqrt(GRAVITY * length)) and across < HARDEST
+    if possible or any("t" in question.about for question in state.questions):
+        return
+    words = (
         f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
-        f": are the units of the clock and of the positions right?",
     )
+    state.ask(("t", "north", "east"), f"{words}: are the units of the clock and of the positions right?")
 
 
-def _ask_clock_by_speed(state: State) -> bool:
-    """Ask where a recorded speed along the heading gives the track only with a clock in another unit, as in minutes."""
-    seen, way = state.chosen.change(state.position), np.exp(1j * state.psi)
-    for name in state.called("speed"):
-        written = unit_in_name(name, "m/s")
-        fit = evidence.fit_scale(seen, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name] * way)))
-        if fit.left > ALONG:
-            continue
-        for unit in (written,) if written is not None else PLAIN:
-            ratio = fit.scale / to_si(unit, "u")
-            other = _clock_unit(state, ratio)
-            if other is not None:
-                begins = f"the track is {ratio:.4g} times the integral of {name!r} in {unit}"
-                state.ask(
-                    ("t", "north", "east"),
-                    f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}",
-                )
-                return True
-    return False
-
-
-def choose_yaw_rate(state: State, most: float = 0.3) -> None:
-    """Choose the yaw rate: the column whose integral fits the heading best; a fitting name wins if nearly as good.
-
-    most : share of the heading's change that a column without a fitting name may leave unexplained.
-    """
-    change = state.chosen.change(state.psi)
-    if float(np.std(change)) < np.radians(0.5):
-        _rate_by_name(state)
-        return
-    called = state.all_called("r")
-    for name in state.called("r"):
-        _take_ais(state, change, name)
-    candidates = [
-        entry
-        for entry in _rate_candidates(state, change, state.eligible("r"))
-        if entry[1] in called
-        or entry[0].left < MISLED
-        or not meaning_scores(entry[1]).keys() & rows_of_role("command").keys()
-    ]  # a large ship may turn by as many deg/min as her rudder has degrees
-    by_name = [
-        entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1
-    ]
-    if not state.numbered and (not candidates or (not by_name and candidates[0][0].left > most)):
-        # a name that says something else misleads, if the integral of its column is the heading to within little
-        others = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and not names_another(name, "r")]
-        candidates = [
-            entry for entry in _rate_candidates(state, change, others) if entry[0].left < MISLED and entry[3] < MISLED
-        ]
-    if not candidates or (not by_name and candidates[0][0].left > most):
-        if called and not state.numbered and called[0] in state.free():
-            state.find(
-                "yaw rate does not fit",
-                (called[0],),
-                0.6,
-                f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used",
-            )
-        return
-    fit, name, unit, _ = by_name[0] if by_name else candidates[0]
-    extra: dict[str, Any] = {}
-    why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
-    confidence = 0.99 * (1 - min(0.5, fit.left))
-    if fit.scale < 0:
-        extra["sign"] = -1
-        state.find("wrong sign of r", (name,), confidence, f"{name!r} is positive where the heading falls")
-    if name not in called and not name.isdecimal():
-        other = f", which {called[0]!r} is not" if called else ""
-        state.find("yaw rate under another name", (name,), confidence, f"{name!r} is the rate of the heading{other}")
-    written = unit_in_name(name, "rad/s")
-    if written is not None and written != unit:
-        state.find("unit of r", (name,), confidence, f"{name!r} says {written}, but is in {unit}")
-    state.suggest("r", name, unit, confidence, why, **extra)
-    state.r = state.columns[name] * to_si(unit, "r") * extra.get("sign", 1)
-
-
-def _take_ais(state: State, change: Complex, name: str) -> None:
-    coded = state.columns[name]
-    if unit_in_name(name, "rad/s") is not None or np.abs(coded).max() > 128 or np.mean(coded % 1 == 0) < WHOLE:
-        return
-    rates = rate_of_ais(coded)
-    known = np.isfinite(rates)
-    if known.sum() < 2:
-        return
-    rates = np.interp(state.t, state.t[known], rates[known])
-    fits_ = [
-        evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, one))) for one in (coded, rates)
-    ]
-    off = abs(abs(fits_[1].scale) / to_si("ais", "r") - 1)
-    if fits_[1].left > min(NAMED_LEFT, fits_[0].left) or off > OFF_AIS:
-        return
-    state.columns[name] = rates
-    state.units[name] = "ais"
-    state.find("unit of r", (name,), 0.9, f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min")
-    if not known.all():
-        state.find(
-            "missing values",
-            (name,),
-            0.95,
-            f"{name!r} is 127, -127 or -128 in {int((~known).sum())} rows, with which AIS says no rate",
-        )
-
-
-def _rate_candidates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:
-    """The columns whose integral resembles the heading, the best first: fit, name, unit, relative distance from it.
-
-    change : of the heading over the windows [rad], (W,).
-    """
-    rates = []
-    for name in names:
-        fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])))
-        scale = max(abs(fit.scale), 1e-12)
-        unit, factor = min(UNITS["rad/s"].items(), key=lambda entry: abs(np.log(scale / entry[1])))
-        off = abs(scale / factor - 1)
-        if fit.left < 0.5 and off < 0.35:
-            rates.append((fit, name, unit, off))
-    return sorted(rates, key=lambda entry: entry[0].left)
-
-
-def _rate_by_name(state: State) -> None:
-    for name in state.called("r")[:1]:
-        unit = unit_in_name(name, "rad/s") or "deg/s"
-        state.suggest("r", name, unit, 0.4, "by its name; the ship turns too little to see unit and sign")
+def report_misnomers(state: State) -> None:
+    """Report columns whose names say another quantity or unit than the motion does, or that count the other way."""
+    for one in state.suggestions if not state.numbered else ():
+        signal = signal_of(one.name)
+        meaning = {"u": "velocity_north", "v": "velocity_east"}.get(signal, signal) if "frame" in one.extra else signal
+        names = {meaning, *({"x", "y"} if meaning in ("north", "east") else ())}
+        scores = meaning_scores(one.source)
+        written = unit_in_name(one.source, si_unit(signal)) if signal != "psi" else None
+        rare = signal in ("u", "v") or (signal == "speed" and one.unit not in PLAIN)
+        usual = written or ("m/s" if rare else one.unit)
+        if max(scores.get(name, 0.0) for name in names) < 0.45 and one.confidence > 0.5:
+            state.find("other name", (one.source,), one.confidence, f"{one.source!r} is {one.name}: {one.evidence}")
+        if one.unit != usual and written != "%":
+            says = f"its name says {written}" if written else "nothing says so"
+            state.find("other unit", (one.source,), one.confidence, f"{one.source!r} is in {one.unit}, and {says}")
+        if "sign" in one.extra and signal not in ("psi", "course", "north", "east", "latitude", "longitude"):
+            words = f"{one.source!r} counts the other way than {one.name}: {one.evidence}"
+            state.find("other sign", (one.source,), one.confidence, words)

@@ -6,8 +6,8 @@ import numpy as np
 
 from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.commands import unique_name
-from shipid.logs.guess.words import is_order, meaning_scores, side_in_name
-from shipid.physics.signals import SIGNALS, is_shaft, rows_of_role, signal_of, signal_row
+from shipid.logs.guess.words import is_order, meaning_scores, name_parts, side_in_name
+from shipid.physics.signals import SIGNALS, is_command, is_shaft, rows_of_role, signal_of
 
 
 def reserve_outputs(state: State) -> dict[str, str]:
@@ -19,31 +19,34 @@ def reserve_outputs(state: State) -> dict[str, str]:
             rivals = [score for meaning, score in scores.items() if meaning != signal]
             clear = unit not in (None, "%") or max(rivals, default=0.0) < scores[signal]
             clear = clear and scores[signal] >= STRONG and unit_of_another(name, signal) is None
-            if clear and not is_order(name) and np.ptp(state.columns[name]) > 0 and name not in chosen:
-                chosen[name] = signal
+            clear = clear and not (signal == "thrust" and unit is None and "thruster" in name_parts(name))  # its order
+            if clear and not is_order(name) and np.ptp(state.columns[name]) > 0:
+                chosen.setdefault(name, signal)
     state.taken.update(chosen)
     return chosen
 
 
 def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
-    """Suggest the reserved columns, for the component of the shaft or rudder on their side."""
+    """Suggest the reserved columns, for the component of the shaft or rudder on their side.
+
+    In a log without a shaft a thrust is taken for the order of one, and that is asked.
+    """
     used: dict[str, int] = {}
+    commands = [one.name for one in state.suggestions if is_command(one.name)]
+    ordered = "force" in SIGNALS and not any(map(is_shaft, commands))
     for name, signal in chosen.items():
-        row = SIGNALS[signal]
-        component = side_in_name(name) or _output_component(state, signal)
-        unit = unit_in_name(name, row.unit)
+        row, usual = SIGNALS[signal], SIGNALS[signal].component
+        shafts = SIGNALS["n"].component == usual
+        alike = [one for one in commands if is_shaft(one) == shafts]
+        alike = [one for one in alike if shafts or SIGNALS[signal_of(one)].component == usual]
+        component = side_in_name(name) or (alike[0].partition(".")[0] if len(alike) == 1 else usual)
+        unit, top = unit_in_name(name, row.unit), float(np.abs(state.columns[name]).max())
         if unit is None:
-            largest = float(np.abs(state.columns[name]).max())
-            state.ask((signal,), f"in which unit is {name!r}, up to {largest:.4g}? {row.unit} is a guess")
-        why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-        state.suggest(unique_name(f"{component}.{signal}", used), name, unit or row.unit, 0.8 if unit else 0.4, why)
-
-
-def _output_component(state: State, signal: str) -> str:
-    usual = SIGNALS[signal].component
-    commands = [
-        one.name for one in state.suggestions if (row := signal_row(one.name)) is not None and row.role == "command"
-    ]
-    alike = [name for name in commands if is_shaft(name) == (SIGNALS["n"].component == usual)]
-    alike = [name for name in alike if is_shaft(name) or SIGNALS[signal_of(name)].component == usual]
-    return alike[0].partition(".")[0] if len(alike) == 1 else usual
+            state.ask((signal,), f"in which unit is {name!r}, up to {top:.4g}? {row.unit} is a guess")
+        sure, why = 0.8 if unit else 0.4, f"by its name; up to {top:.4g}"
+        if signal == "thrust" and ordered:
+            state.ask(
+                ("force", "thrust"), f"is {name!r} the thrust that is ordered, or what is measured? Order is a guess"
+            )
+            signal, sure, why = "force", min(sure, 0.5), f"{why}; there is no other order of this screw"
+        state.suggest(unique_name(f"{component}.{signal}", used), name, unit or row.unit, sure, why)

@@ -168,28 +168,24 @@ def _join_files(logs: list[LogTable]) -> LogTable:
         return first
     chosen = logs if len(logs) <= MOST else [logs[i] for i in np.linspace(0, len(logs) - 1, MOST).astype(int)]
     names = [name for name in first.columns if all(name in log.columns for log in chosen)]
-    t, start = [], 0.0
-    for log in chosen:
-        t.append(log.t - log.t[0] + start)
-        start = float(t[-1][-1]) + PAUSE
+    starts = np.cumsum([0.0, *(float(np.ptp(log.t)) + PAUSE for log in chosen)])
+    t = np.concatenate([log.t - log.t[0] + start for log, start in zip(chosen, starts, strict=False)])
     columns = {name: np.concatenate([log.columns[name] for log in chosen]) for name in names}
-    form, clock = dict(first.form), dict(first.clock)
-    if any(log.form.get("ragged") for log in logs):
-        form["ragged"] = "drop"
+    form = first.form | ({"ragged": "drop"} if any(log.form.get("ragged") for log in logs) else {})
     form |= next(({"thousands": log.form["thousands"]} for log in logs if "thousands" in log.form), {})
-    rates = {log.clock.get("every") for log in logs}
-    if rates != {None}:
-        clock["every"] = float(np.median([log.clock["every"] for log in logs if "every" in log.clock]))
-    if any("repeated" in log.clock for log in logs):
-        clock["repeated"] = "drop"
     missing = dict.fromkeys(text for log in logs for text in log.form.get("missing", ()))
-    if missing:
-        form["missing"] = list(missing)
-    notes = tuple(dict.fromkeys(note for log in logs for note in log.notes))
-    doubts = tuple(dict.fromkeys(doubt for log in logs for doubt in log.doubts))
-    seams = sum(log.seams for log in chosen) + len(chosen) - 1
-    sides = frozenset[str]().union(*(log.sides for log in logs))
-    joined = replace(
-        first, form=form, clock=clock, t=np.concatenate(t), columns=columns, notes=notes, seams=seams, doubts=doubts
+    form |= {"missing": list(missing)} if missing else {}
+    rates = [log.clock["every"] for log in logs if "every" in log.clock]
+    clock = first.clock | ({"every": float(np.median(rates))} if rates else {})
+    clock |= {"repeated": "drop"} if any("repeated" in log.clock for log in logs) else {}
+    return replace(
+        first,
+        form=form,
+        clock=clock,
+        t=t,
+        columns=columns,
+        notes=tuple(dict.fromkeys(note for log in logs for note in log.notes)),
+        seams=sum(log.seams for log in chosen) + len(chosen) - 1,
+        doubts=tuple(dict.fromkeys(doubt for log in logs for doubt in log.doubts)),
+        sides=frozenset[str]().union(*(log.sides for log in logs)),
     )
-    return replace(joined, sides=sides)

@@ -8,6 +8,7 @@ import pytest
 from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import choose_commands
+from shipid.logs.guess.motion import report_misnomers
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.words import number_in_name
 from shipid.vessel.dynamics import vessel_dynamics
@@ -32,6 +33,7 @@ def drafted(columns: dict[str, np.ndarray], ship: Vessel) -> tuple[State, dict[s
     choose_commands(state)
     suggest_outputs(state, outputs)
     name_commands(state, ship)
+    report_misnomers(state)
     return state, {one.name: one.source for one in state.suggestions}
 
 
@@ -170,4 +172,4 @@ def test_the_sign_of_an_azimuth_unit_is_that_of_its_place(x: float, turns: float
     state, _ = drafted({"azimuth port": right * turns * ALPHA, "azimuth stbd": right * turns * ALPHA, "rpm": RPM}, ship)
     signs = {one.name: one.extra.get("sign", 1) for one in state.suggestions if one.name.endswith("alpha")}
     assert signs == dict.fromkeys(("port.alpha", "starboard.alpha"), turns)
-    assert ("wrong sign of rudder" in {one.kind for one in state.findings}) == (turns < 0)
+    assert ("other sign" in {one.kind for one in state.findings}) == (turns < 0)

@@ -10,6 +10,7 @@ import pytest
 
 from shipid.data.dataset import cumulative_integral
 from shipid.logs.guess.changes import ask_for_changes, other_part
+from shipid.logs.guess.columns import guess
 from tests.drawn import seeds
 from tests.logs.simulated import as_bridge, guess_of, si_log, state_of
 
@@ -99,5 +100,25 @@ def test_an_angle_that_turns_the_ship_otherwise_is_asked_under_way_alone(seed: i
     state.position = np.cumsum(speed * np.exp(1j * state.psi)) + random.normal(0, 0.3, len(t))
     state.suggest("thruster.alpha", "azimuth", "rad", 0.9, "by its name")
     ask_for_changes(state)
-    asked = [one.sentence for one in state.questions if "turn the ship to the other side" in one.sentence]
+    asked = [one.sentence for one in state.questions if "times as fast: to the other side" in one.sentence]
     assert len(asked) == (not slow)
+
+
+ODD = {
+    "heading": (2, lambda part: part.assign(psi=(part["psi"] + 90.0) % 360.0), "keep to 'psi'"),
+    "axes": (2, lambda part: part.assign(N=part["E"], E=part["N"]), "keep to 'psi'"),
+    "rudder": (0, lambda part: part.assign(rudder=-part["rudder"]), "'rudder' turns the ship to the other side"),
+    "none": (0, lambda part: part, ""),
+}
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_a_file_of_another_kind_is_named(kind: str, tmp_path: Path) -> None:
+    """Before, one file of a folder with another frame or sign was imported as the others, without a word."""
+    odd, change, words = ODD[kind]
+    for number, rows in enumerate(np.array_split(np.arange(len(CLEAN)), 5)):
+        part = CLEAN.iloc[rows]
+        (change(part) if number == odd else part).to_csv(tmp_path / f"run{number}.csv", index=False)
+    asked = [one.sentence for one in guess(tmp_path).questions if "in file " in one.sentence]
+    assert len(asked) == (kind != "none")
+    assert all(f"in file {odd + 1} of 5" in sentence and words in sentence for sentence in asked)

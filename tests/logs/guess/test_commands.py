@@ -7,6 +7,7 @@ import pytest
 
 from shipid.logs.guess.clues import LIKELY, State
 from shipid.logs.guess.commands import choose_commands, likely_unit
+from shipid.logs.guess.motion import report_misnomers
 from tests.logs.simulated import si_log, state_with_pose
 
 LOG = si_log()
@@ -22,6 +23,7 @@ def chosen(columns: dict[str, np.ndarray], quiet: bool = False) -> State:
         assert state.psi is not None
         state.psi = state.r = 0.0 * state.psi
     choose_commands(state)
+    report_misnomers(state)
     return state
 
 
@@ -33,10 +35,10 @@ def described(state: State) -> dict[str, tuple[str, str, int]]:
     ("columns", "expected", "kinds"),
     [
         ({"rudder": RUDDER}, {"rudder.delta": ("rudder", "deg", 1)}, set()),
-        ({"rudder": -RUDDER}, {"rudder.delta": ("rudder", "deg", -1)}, {"wrong sign of rudder"}),
+        ({"rudder": -RUDDER}, {"rudder.delta": ("rudder", "deg", -1)}, {"other sign"}),
         ({"rudder": np.radians(RUDDER)}, {"rudder.delta": ("rudder", "rad", 1)}, set()),
         ({"azimuth": -RUDDER}, {"thruster.alpha": ("azimuth", "deg", 1)}, set()),
-        ({"azimuth": RUDDER}, {"thruster.alpha": ("azimuth", "deg", -1)}, {"wrong sign of rudder"}),
+        ({"azimuth": RUDDER}, {"thruster.alpha": ("azimuth", "deg", -1)}, {"other sign"}),
         ({"channel a": np.sin(T), "channel b": RUDDER}, {"rudder.delta": ("channel b", "deg", 1)}, set()),
     ],
     ids=["starboard", "port", "rad", "azimuth", "azimuth to starboard", "no name"],
@@ -118,7 +120,7 @@ def test_the_shaft_of_a_controllable_pitch_propeller_is_no_pitch() -> None:
         ("shaft speed", RPM, "rpm", False, set()),
         ("shaft speed", N, "rev/s", False, set()),
         ("shaft [rpm]", RPM, "rpm", False, set()),
-        ("shaft [rpm]", RPM / 60, "rev/s", False, {"unit of the shaft"}),
+        ("shaft [rpm]", RPM / 60, "rev/s", False, {"other unit"}),
         ("shaft speed [%]", RPM / 2.5, "rpm", True, set()),
         ("shaft speed", RPM / 2.5, "rpm", True, set()),
     ],
@@ -216,3 +218,17 @@ def test_a_unit_that_is_not_known_is_asked(name: str, values: np.ndarray, column
     assert [one.sentence.partition(":")[0] for one in state.questions if name in one.sentence] == [
         f"{name!r} says {name.partition('[')[2][:-1]!r}, no unit that is known here"
     ]
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("names", [("RCOU.C1", "RCOU.C3"), ("servo1_raw", "servo3_raw"), ("chan 1", "throttle_pct")])
+def test_pulses_are_drafted_by_what_the_ship_does_after_them(names: tuple[str, str], sense: int) -> None:
+    """1500 us is amidships; the angle of the largest pulse is asked, and so is the shaft speed of a throttle."""
+    state = chosen({names[0]: 1500.0 + sense * 400.0 / 45.0 * RUDDER, names[1]: 1500.0 + 2.0 * RPM})
+    assert described(state)["rudder.delta"] == (names[0], "deg", sense)
+    (angle,) = (one for one in state.suggestions if one.name == "rudder.delta")
+    assert angle.confidence < LIKELY
+    assert angle.extra["factor"] * 400.0 == pytest.approx(45.0)
+    assert angle.extra["offset"] == pytest.approx(-sense * 1500.0 * 45.0 / 400.0)
+    assert described(state)["propeller.n"][0] == names[1]
+    assert any("dead band" in one.sentence for one in state.questions)

@@ -38,7 +38,7 @@ def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
         u=log["u"] / KNOT, v=log["v"] / KNOT, rudder=-log["rudder"], N=log["N"] + 150.0 * (log["time"] > 700)
     )
     proposal = guess_of(tmp_path, log.rename(columns={"r": "p"}))
-    assert proposal.kinds == {"knots", "wrong sign of rudder", "position jumps", "yaw rate under another name"}
+    assert proposal.kinds == {"other unit", "other sign", "position jumps", "other name"}
     dataset = import_log(read_mapping(write_new(draft_mapping(proposal), tmp_path / "draft.toml")), proposal.file)
     assert check_dataset(dataset)["ok"].all()
     assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.8

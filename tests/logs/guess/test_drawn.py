@@ -65,3 +65,9 @@ def test_raw_folders_are_read_or_it_says_why_not(seed: int, tmp_path: Path) -> N
 def test_degrees_of_a_log_without_names_are_no_metres(tmp_path: Path) -> None:
     """A noisy track of a boat at 54 N fitted a little better as metres, at 0.015 mm/s, and u came from it."""
     assert judge(draw(710115, tmp_path / "logs")).word == "right"
+
+
+@pytest.mark.parametrize("seed", [393344, 393381])
+def test_revolutions_a_second_that_are_called_rpm_are_read_by_the_way_of_the_ship(seed: int, tmp_path: Path) -> None:
+    """They were 60 times too slow without a word."""
+    assert judge(draw(seed, tmp_path / "logs")).word == "right"

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.motion import (
-    check_clock,
-    choose_velocities,
-    choose_yaw_rate,
-    is_possible,
-)
+from shipid.logs.guess.motion import check_clock, choose_motion, report_misnomers
 from tests.logs.conftest import SPEEDS
-from tests.logs.simulated import KNOT, si_log, state_with_pose
+from tests.logs.simulated import KNOT, si_log, state_of, state_with_pose
 
 LOG = si_log()
 T, PSI, U, V, R = (LOG[name].to_numpy() for name in ("t", "psi", "u", "v", "r"))
@@ -21,9 +18,22 @@ BODY = U + 1j * V
 GROUND = BODY * np.exp(1j * PSI)
 
 
+def chosen(columns: dict[str, np.ndarray]) -> State:
+    """The motion of these columns beside a position and a heading."""
+    pose = {"N": LOG["north"].to_numpy(), "E": LOG["east"].to_numpy(), "heading": np.degrees(PSI) % 360.0}
+    state = state_of(pose | columns, T)
+    choose_motion(state, Path("log.csv"))
+    report_misnomers(state)
+    return state
+
+
 def described(state: State) -> dict[str, tuple[str, str, int]]:
     """Column of the dataset -> source, unit, sign."""
-    return {c.name: (c.source, c.unit, c.extra.get("sign", 1)) for c in state.suggestions}
+    return {
+        c.name: (c.source, c.unit, c.extra.get("sign", 1))
+        for c in state.suggestions
+        if c.name in ("u", "v", "r", "speed", "course")
+    }
 
 
 def kinds(state: State) -> set[str]:
@@ -32,18 +42,18 @@ def kinds(state: State) -> set[str]:
 
 VELOCITIES: dict[str, tuple[dict[str, np.ndarray], dict[str, tuple[str, str, int]], set[str]]] = {
     "body": ({"u": U, "v": V}, {"u": ("u", "m/s", 1), "v": ("v", "m/s", 1)}, set()),
-    "knots": ({"u": U / KNOT, "v": V / KNOT}, {"u": ("u", "kn", 1), "v": ("v", "kn", 1)}, {"knots"}),
-    "to port": ({"u": U, "v": -V}, {"u": ("u", "m/s", 1), "v": ("v", "m/s", -1)}, {"wrong sign of v"}),
-    "swapped": ({"v": U, "u": V}, {"u": ("v", "m/s", 1), "v": ("u", "m/s", 1)}, {"u and v swapped"}),
+    "knots": ({"u": U / KNOT, "v": V / KNOT}, {"u": ("u", "kn", 1), "v": ("v", "kn", 1)}, {"other unit"}),
+    "to port": ({"u": U, "v": -V}, {"u": ("u", "m/s", 1), "v": ("v", "m/s", -1)}, {"other sign"}),
+    "swapped": ({"v": U, "u": V}, {"u": ("v", "m/s", 1), "v": ("u", "m/s", 1)}, {"other name"}),
     "earth": (
         {"u": GROUND.real, "v": GROUND.imag},
         {"u": ("u", "m/s", 1), "v": ("v", "m/s", 1)},
-        {"earth-fixed velocities"},
+        {"other name"},
     ),
     "under other names": (
         {"channel a": U, "channel b": V, "channel c": np.sin(T)},
         {"u": ("channel a", "m/s", 1), "v": ("channel b", "m/s", 1)},
-        {"velocities under other names"},
+        {"other name"},
     ),
     "speed and course": (
         {"sog": np.abs(GROUND) / KNOT, "cog": np.degrees(np.angle(GROUND)) % 360.0},
@@ -57,8 +67,7 @@ VELOCITIES: dict[str, tuple[dict[str, np.ndarray], dict[str, tuple[str, str, int
 @pytest.mark.parametrize("name", VELOCITIES)
 def test_velocities(name: str) -> None:
     columns, expected, findings = VELOCITIES[name]
-    state = state_with_pose(columns)
-    choose_velocities(state)
+    state = chosen(columns)
     assert described(state) == expected
     assert kinds(state) == findings
     if expected:
@@ -69,8 +78,7 @@ def test_velocities(name: str) -> None:
 
 
 def test_a_factor_is_seen_with_its_error() -> None:
-    state = state_with_pose({"u": 1.05 * U, "v": 1.05 * V})
-    choose_velocities(state)
+    state = chosen({"u": 1.05 * U, "v": 1.05 * V})
     (finding,) = state.findings
     assert finding.kind == "factor"
     assert finding.repair is not None
@@ -92,11 +100,10 @@ def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> No
 
     Millimetres a second, and a clock in ms, leave one track: without a name that is asked.
     """
-    state = state_with_pose(spoken(unit, kind, named))
-    choose_velocities(state)
-    assert {one.unit for one in state.suggestions if one.name != "course"} == {unit}
+    state = chosen(spoken(unit, kind, named))
+    assert {one.unit for one in state.suggestions if one.name in ("u", "v", "speed")} == {unit}
     usual = unit == "m/s" or (kind != "body" and unit in ("kn", "km/h"))
-    assert kinds(state) == (set() if named or usual else {"knots"} if unit == "kn" else {"speed unit"})
+    assert kinds(state) == (set() if named or usual else {"other unit"})
     assert len(state.questions) == (unit == "mm/s" and not named)
     assert state.velocity is not None
     np.testing.assert_allclose(state.velocity, GROUND, atol=1e-9)
@@ -106,7 +113,6 @@ def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> No
 def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> None:
     """Without velocities in the log the pace of the track says that the clock has another unit."""
     state = state_with_pose({}, 1.0 / wrong)
-    assert is_possible(state) == (not asked)
     check_clock(state)
     check_clock(state)  # once is enough
     assert len(state.questions) == asked
@@ -116,17 +122,16 @@ def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> Non
     ("columns", "expected", "findings"),
     [
         ({"rot": np.degrees(R)}, ("rot", "deg/s", 1), set()),
-        ({"rot": -R}, ("rot", "rad/s", -1), {"wrong sign of r"}),
-        ({"rot [deg/s]": R}, ("rot [deg/s]", "rad/s", 1), {"unit of r"}),
-        ({"p": R, "r": np.sin(T / 3)}, ("p", "rad/s", 1), {"yaw rate under another name"}),
+        ({"rot": -R}, ("rot", "rad/s", -1), {"other sign"}),
+        ({"rot [deg/s]": R}, ("rot [deg/s]", "rad/s", 1), {"other unit"}),
+        ({"p": R, "r": np.sin(T / 3)}, ("p", "rad/s", 1), {"other name"}),
         ({"r": np.sin(T / 3)}, None, {"yaw rate does not fit"}),
         ({"roll rate": 0.3 * R + 0.1 * np.sin(T)}, None, set()),
     ],
     ids=["deg/s", "sign", "unit", "misleading", "none", "roll"],
 )
 def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int] | None, findings: set[str]) -> None:
-    state = state_with_pose(columns)
-    choose_yaw_rate(state)
+    state = chosen(columns)
     assert described(state).get("r") == expected
     assert kinds(state) == findings
     if expected is not None:
@@ -145,8 +150,7 @@ def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, 
     """As by the north of a map or a compass; it is no factor of the speed, which its cosine looked like."""
     turn = np.radians(degrees)
     there = GROUND * np.exp(1j * turn)
-    state = state_with_pose({"v north": there.real, "v east": there.imag} if earth else over_ground(turn))
-    choose_velocities(state)
+    state = chosen({"v north": there.real, "v east": there.imag} if earth else over_ground(turn))
     assert not state.findings
     assert len(state.questions) == (abs(degrees) >= 1.0)
     for question in state.questions:

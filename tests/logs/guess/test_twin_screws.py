@@ -94,3 +94,16 @@ def test_what_is_no_throttle_is_left(names: tuple[str, str]) -> None:
     log = craft(2)
     columns = {name: log[side].to_numpy() for name, side in zip(names, ("port", "starboard"), strict=True)}
     assert guessed(log, columns).suggestions == []
+
+
+@pytest.mark.parametrize("names", [("motor1", "motor2"), ("RCOU.C1", "RCOU.C3"), ("esc0", "esc1")])
+@pytest.mark.parametrize("order", [1, -1])
+def test_two_orders_that_turn_the_craft_against_each_other_are_its_screws(names: tuple[str, str], order: int) -> None:
+    """Whatever the order of the columns; the sides are asked, as no name says them."""
+    log = craft(1)
+    pair = {
+        name: 1500.0 + 400.0 * log[side].to_numpy() for name, side in zip(names, ("port", "starboard"), strict=True)
+    }
+    state = guessed(log, dict([*pair.items()][::order]))
+    assert {one.name: one.source for one in state.suggestions} == {"port.n": names[0], "starboard.n": names[1]}
+    assert any(f"is {names[0]!r} to port and {names[1]!r} to starboard?" in one.sentence for one in state.questions)

@@ -10,7 +10,8 @@ from pymap3d import ned2geodetic
 
 from shipid.errors import DataError
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.pose import Frame, choose_pose
+from shipid.logs.guess.motion import choose_motion
+from shipid.logs.guess.search import Frame
 from tests.logs.simulated import si_log, state_of
 
 LOG = si_log()
@@ -22,7 +23,7 @@ FILE = Path("log.csv")
 
 def chosen(columns: dict[str, np.ndarray]) -> State:
     state = state_of(columns, T)
-    choose_pose(state, FILE)
+    choose_motion(state, FILE)
     return state
 
 
@@ -81,19 +82,19 @@ def test_names_that_mislead_are_overridden_with_a_reason() -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "kind"),
+    "columns",
     [
-        ({"N": EAST, "E": NORTH, "heading": DEG}, "north and east swapped"),
-        ({"x": EAST, "y": NORTH, "heading": DEG}, "x is east"),
-        ({"N": NORTH, "E": EAST, "heading": -DEG % 360.0}, "heading counted to port"),
-        ({"N": NORTH, "E": EAST, "yaw": (90.0 - DEG) % 360.0}, "heading counted from east"),
-        ({"N": NORTH, "E": EAST, "heading": (DEG + 180.0) % 360.0}, "zero of the heading"),
+        {"N": EAST, "E": NORTH, "heading": DEG},
+        {"x": EAST, "y": NORTH, "heading": DEG},
+        {"N": NORTH, "E": EAST, "heading": -DEG % 360.0},
+        {"N": NORTH, "E": EAST, "yaw": (90.0 - DEG) % 360.0},
+        {"N": NORTH, "E": EAST, "heading": (DEG + 180.0) % 360.0},
     ],
-    ids=lambda value: value if isinstance(value, str) else "",
+    ids=["swapped", "x is east", "to port", "from east", "zero"],
 )
-def test_frames_signs_and_zeros(columns: dict[str, np.ndarray], kind: str) -> None:
+def test_frames_signs_and_zeros(columns: dict[str, np.ndarray]) -> None:
     state = chosen(columns)
-    assert {finding.kind for finding in state.findings} == {kind}
+    assert {finding.kind for finding in state.findings} == {"frame"}
     assert_motion(state)
 
 
@@ -112,7 +113,7 @@ COURSE = np.degrees(np.unwrap(np.angle(np.gradient(NORTH) + 1j * np.gradient(EAS
 def test_a_course_over_ground_shows_the_frame(columns: dict[str, np.ndarray], signs: dict[str, int]) -> None:
     state = chosen(columns)
     assert {one.name: one.extra["sign"] for one in state.suggestions if "sign" in one.extra} == signs
-    assert ("frame by course or velocity" in {finding.kind for finding in state.findings}) == bool(signs)
+    assert ("frame" in {finding.kind for finding in state.findings}) == bool(signs)
     assert bool(state.questions) != bool(signs)
     assert_motion(state)
 
@@ -148,7 +149,7 @@ def test_velocities_to_north_and_east_show_the_frame(columns: dict[str, np.ndarr
 )
 def test_a_frame_that_is_known_is_taken(frame: Frame, x: np.ndarray, y: np.ndarray, yaw: np.ndarray) -> None:
     state = state_of({"x": x, "y": y, "yaw": yaw % 360.0}, T)
-    choose_pose(state, FILE, frame)
+    choose_motion(state, FILE, frame)
     assert_motion(state)
     assert state.questions == []
 
@@ -157,7 +158,7 @@ def test_a_frame_that_is_known_is_taken(frame: Frame, x: np.ndarray, y: np.ndarr
 def test_a_frame_in_which_the_ship_does_not_move_is_refused(frame: Frame, x: str, y: str) -> None:
     size = 1e5 if x == "lat" else 1.0
     with pytest.raises(DataError, match=r"--frame: .*(fit ned or zup or ros|no other frame)"):
-        choose_pose(state_of({x: NORTH / size, y: EAST / size, "yaw": DEG}, T), FILE, frame)
+        choose_motion(state_of({x: NORTH / size, y: EAST / size, "yaw": DEG}, T), FILE, frame)
 
 
 @pytest.mark.parametrize(
@@ -206,4 +207,22 @@ def test_a_ship_that_goes_astern_all_the_time_keeps_her_heading(
     np.testing.assert_allclose(np.exp(1j * state.psi), -np.exp(1j * PSI), atol=1e-6)
     assert not state.negated
     assert [one.sentence for one in state.findings if one.kind == "astern" and why in one.sentence]
-    assert not state.questions
+    assert not [one for one in state.questions if "psi" in one.about]
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "yaw", "reading"),
+    [
+        (NORTH, EAST, DEG, "'x' to north, 'y' to east, '{}' counted to starboard from north"),
+        (NORTH, -EAST, -DEG, "'x' to north, 'y' to west, '{}' counted to port from north"),
+        (EAST, NORTH, 90.0 - DEG, "'x' to east, 'y' to north, '{}' counted to port from east"),
+    ],
+    ids=["ned", "zup", "ros"],
+)
+@pytest.mark.parametrize("name", ["yaw", "heading", "theta"])
+def test_the_true_frame_is_among_those_that_are_asked(
+    x: np.ndarray, y: np.ndarray, yaw: np.ndarray, reading: str, name: str
+) -> None:
+    """The motion is the same in all of them, in which port and starboard change places."""
+    (question,) = chosen({"x": x, "y": y, name: yaw % 360.0}).questions
+    assert reading.format(name) in question.sentence
