@@ -39,13 +39,38 @@ estimated without a part of the runs (or of the time, where there is one run) an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
 
-from shipid.data.dataset import Dataset
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
+from shipid.data.checks import white_noise_of
+from shipid.engine.casadi import memory_along
+from shipid.engine.rollout import rollout_distances
+from shipid.errors import DataError
+from shipid.identification.causes import Cause, Motion, Scales, list_causes
+from shipid.physics.signals import is_command, is_wrapped_angle
+from shipid.simulation.log import body_velocities, state_column
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 NONE, UNCLEAR = "none", "cannot tell"
+LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
+MOST_BUMPS = 400  # of a log: of a longer one parts are taken, evenly
+SMOOTH = POINTS / 24  # steps: standard deviation of the smoothing before the forces
+EXACT = 0.01  # of the size of the terms: what no resampled log says better
+AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
+FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
+ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
+SURE, APART, WORTH = 3.0, 2.0, 0.25  # standard errors; standard errors; share of the error of the path
+CHANNELS = ("u", "v", "r", "psi", "along", "across")
 
 
 @dataclass(frozen=True)
@@ -55,8 +80,9 @@ class Diagnosis:
     cause : key, `none` or `cannot tell`. equals : keys that the log does not tell from it.
     size : of the cause in SI units, an empty tuple where it has none (a sign). interval : 95 %, (low, high) of each.
     repair : lines for the mapping of the log, the vessel or the settings of an identification.
-    sentence : all of it in words.
+    sentence : all of it in words. share : of the error of the predicted path that it explains.
     next : the same of a second cause beside the first, if there is one.
+    misfits : key -> misfit on parts left out, less that of `none`.
     """
 
     cause: str
@@ -65,9 +91,328 @@ class Diagnosis:
     interval: tuple[tuple[float, float], ...] = ()
     repair: str = ""
     sentence: str = ""
+    share: float = 0.0
     next: Diagnosis | None = None
+    misfits: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Causes fitted together: the residuals (6, W) at their sizes (k,), those on parts left out, and the covariance."""
+
+    causes: tuple[Cause, ...]
+    theta: Array
+    residuals: Array
+    left_out: Array
+    covariance: Array
+    motion: Motion
+
+
+class _Log:
+    """A log at equal steps with its bumps, and the residuals of any change of it."""
+
+    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
+        if "current" not in vessel.document:
+            vessel = vessel.with_values({"current.kind": "uniform"})
+        self.vessel, self.model = vessel, vessel_dynamics(vessel)
+        stretches = [(run, rows) for run, rows in stretch_columns(dataset) if run in runs]
+        missing = next((name for name in self.model.commands if name not in dataset.commands), None)
+        if missing is not None:
+            raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
+        speed = np.concatenate([np.hypot(rows["u"], rows["v"]) for _, rows in stretches])
+        fast = float(np.sqrt(np.mean(speed**2)))
+        usual = float(np.median(np.concatenate([np.diff(rows["t"]) for _, rows in stretches])))
+        longest = max(float(np.ptp(rows["t"])) for _, rows in stretches)
+        rate = float(np.sqrt(np.mean(np.concatenate([rows["r"] for _, rows in stretches]) ** 2)))
+        length = vessel.length or fast / max(rate, 1e-9)
+        self.scales = Scales(length, fast, usual)
+        self.width = max(min(LENGTHS * self.scales.passing, longest / 4), 8 * usual)
+        self.step = self.width / POINTS
+        self.motion = self._resample(runs, stretches)
+        self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
+        self.noise = self._noise(stretches, usual)
+        self._memory: tuple[list[Array], Array] | None = None
+
+    def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
+        parts: list[dict[str, Array]] = []
+        places: list[int] = []
+        for run, rows in stretches:
+            t = np.asarray(rows["t"], dtype=float)
+            count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
+            if count > POINTS + 1 and len(t) > 8:
+                grid = t[0] + self.step * np.arange(count)
+                names = [name for name in rows if name not in ("run", "t", "flags")]
+                parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
+                places.append(list(runs).index(run))
+        if not parts:
+            raise DataError(
+                f"no stretch is longer than {self.width:.3g} s, in which the ship runs {LENGTHS:g} lengths", path="runs"
+            )
+        names = parts[0].keys() & set.intersection(*(set(part) for part in parts))
+        ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
+        zero = np.zeros(int(ends[-1]))
+        columns |= {name: zero for name in self.model.environment if name not in columns}
+        slices = tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return Motion(columns, np.array(list(self.vessel.parameters.values())), slices, tuple(places), self.step)
+
+    def _cut(self, duration: float) -> None:
+        """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
+        begins, blocks, folds = [], [], []
+        several = len(set(self.motion.runs)) >= FOLDS
+        every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
+        for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
+            here = np.arange(part.start, part.stop - POINTS - 1, every)
+            number = np.arange(len(here)) // BLOCK
+            begins.append(here)
+            blocks.append(number + (max(map(max, filter(len, blocks)), default=-1) + 1))
+            folds.append(np.full(len(here), run % FOLDS) if several else number % FOLDS)
+        begin = np.concatenate(begins)
+        self.bumps = begin[:, None] + np.arange(POINTS + 1)
+        self.block, self.fold = np.concatenate(blocks), np.concatenate(folds)
+        self.paths = np.concatenate(
+            [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
+        ).astype(int)
+        s = np.linspace(-1, 1, POINTS + 1)
+        phi, slope = (1 - s**2) ** 3, -s * (1 - s**2) ** 2
+        self.phi, t = phi / phi.sum(), self.step * np.arange(POINTS + 1)
+        slope = slope - slope.mean()
+        self.pull = slope / (slope @ t)
+        self.worth = len(begin) * STRIDE / POINTS if every == STRIDE else float(len(begin))
+        psi = self.motion.columns["psi"][self.bumps[:, POINTS // 2]]
+        self.turn = np.exp(-1j * psi)
+        used = np.unique(self.bumps)
+        self.used, self.place = used, np.searchsorted(used, self.bumps)
+
+    def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
+        """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
+        share = min(usual / self.step, 1.0) ** 0.5
+
+        def white(name: str) -> float:
+            values = [np.unwrap(rows[name]) if name == "psi" else rows[name] for _, rows in stretches]
+            return share * float(np.median([white_noise_of(np.asarray(one, dtype=float)) for one in values]))
+
+        pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
+        speed, passing = self.scales.speed, self.scales.passing
+        sizes = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
+        velocity = [pulled * white(name) for name in ("u", "v", "r")]
+        place = pulled * max(white("north"), white("east"))
+        heading = summed * speed * white("psi")
+        noise = [*velocity, np.hypot(pulled * white("psi"), summed * white("r")),
+                 np.hypot(place, summed * white("u")), np.hypot(np.hypot(place, heading), summed * white("v"))]  # fmt: skip
+        return np.hypot(noise, EXACT * 0.1 * sizes)
+
+    def memory(self, motion: Motion) -> Array:
+        """Actuator states (M, N) that the orders of a log reach."""
+        orders = [motion.columns[name] for name in self.model.commands]
+        if self._memory is not None and all(a is b for a, b in zip(orders, self._memory[0], strict=True)):
+            return self._memory[1]
+        result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
+        if self.model.memory:
+            for part in motion.stretches:
+                given = {name: values[part] for name, values in zip(self.model.commands, orders, strict=True)}
+                reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
+                result[:, part] = np.array([reached[name] for name in self.model.memory])
+        if self._memory is None:
+            self._memory = orders, result
+        return result
+
+    def states(self, motion: Motion) -> dict[str, Array]:
+        """Columns of the states, those of motion smoothed."""
+        columns = dict(motion.columns)
+        for name in ("u", "v", "r", "psi"):
+            values = np.array(columns[name])
+            for part in motion.stretches:
+                values[part] = gaussian_filter1d(columns[name][part], SMOOTH, mode="nearest")
+            columns[name] = values
+        return columns | dict(body_velocities(columns))
+
+    def accelerations(self, motion: Motion) -> Array:
+        """Accelerations (3, n) by the physics of u, v, r at the steps that bumps use."""
+        columns, at, zero = self.states(motion), self.used, np.zeros(len(self.used))
+        state = [
+            columns[state_column(name)][at] if state_column(name) in columns else zero
+            for name in (*self.model.state, *self.model.hidden)
+        ]
+        inputs = [np.array(state), self.memory(motion)[:, at]]
+        inputs += [
+            np.array([columns[name][at] for name in names]).reshape(-1, len(at))
+            for names in (self.model.commands, self.model.environment)
+        ]
+        return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
+
+    def residuals(self, motion: Motion) -> Array:
+        """Residuals (6, W): measured change less predicted change, a unit of time."""
+        columns, bumps = motion.columns, self.bumps
+        forces = self.accelerations(motion)[:, self.place] @ self.phi
+        changes = [columns[name][bumps] @ self.pull for name in ("u", "v", "r", "psi", "north", "east")]
+        velocity = (columns["u"] + 1j * columns["v"]) * np.exp(1j * columns["psi"])
+        path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
+        return np.stack(
+            [*(np.array(changes[:3]) - forces), changes[3] - columns["r"][bumps] @ self.phi, path.real, path.imag]
+        )
+
+    def path_error(self, motion: Motion) -> float:
+        """Mean error [m] of the paths that the physics predicts over 2.5 ship lengths."""
+        columns, at = self.states(motion), self.paths
+        rows = at + np.arange(AHEAD + 1)[:, None]
+        start = {
+            name: columns[state_column(name)][at] if state_column(name) in columns else np.zeros(len(at))
+            for name in (*self.model.state, *self.model.hidden)
+        }
+        memory = dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True))
+        goal = np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1)
+        found = rollout_distances(
+            self.vessel, start, {name: columns[name][rows[:-1]] for name in self.model.commands},
+            {name: columns[name][rows[:-1]] for name in self.model.environment}, goal,
+            step=self.step, method="rk4", parameters=motion.parameters[None], memory=memory,
+        )  # fmt: skip
+        error = found.total[0] / AHEAD
+        return float(np.where(found.diverged[0], self.scales.length * 10, error).mean())
+
+    def estimate(self, causes: Sequence[Cause], start: Array, base: Motion) -> _Fit:
+        """Fit causes together by Gauss-Newton from a start; one that lowers nothing stays there."""
+        trials = np.array([trial for cause in causes for trial in cause.trial])
+        ends = np.cumsum([0, *(len(cause.trial) for cause in causes)])
+
+        def change(theta: Array) -> tuple[Motion, Array]:
+            motion, scaled = base, np.ones(6)
+            for cause, first, last in zip(causes, ends[:-1], ends[1:], strict=True):
+                motion = cause.change(motion, theta[first:last])
+                scaled[list(cause.scaled)] *= np.exp(theta[first]) if cause.scaled else 1.0
+            return motion, self.residuals(motion) * scaled[:, None]
+
+        theta = np.array(start, dtype=float)
+        motion, z = change(theta)
+        J = np.zeros((len(theta), *z.shape))
+        for _ in range(ROUNDS if len(theta) else 0):
+            J = np.array(
+                [(change(theta + trials * (np.arange(len(theta)) == i))[1] - z) / trials[i] for i in range(len(theta))]
+            )
+            step = self._step(J, z, np.ones(z.shape[1], dtype=bool))
+            step = np.clip(step, -20 * trials, 20 * trials)
+            before = self.misfit(z)
+            for _ in range(HALVINGS):
+                after, moved = change(theta + step)
+                if self.misfit(moved) < before:
+                    break
+                step = step / 2
+            else:
+                break
+            theta, motion, z = theta + step, after, moved
+            if (np.abs(step) < SETTLED * np.abs(trials)).all():
+                break
+        left = z.copy()
+        for fold in range(FOLDS) if len(theta) else ():
+            out = self.fold == fold
+            if out.any() and not out.all():
+                left[:, out] += np.tensordot(self._step(J, z, ~out), J[:, :, out], 1)
+        return _Fit(tuple(causes), theta, z, left, self._covariance(J, z), motion)
+
+    def _weights(self, z: Array) -> Array:
+        return np.asarray(1 / np.sqrt((z**2).mean(axis=1) + self.noise**2))
+
+    def _step(self, J: Array, z: Array, kept: NDArray[np.bool_]) -> Array:
+        weight = self._weights(z[:, kept])[:, None]
+        A = (J[:, :, kept] * weight).reshape(len(J), -1).T
+        size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+        return np.asarray(-np.linalg.lstsq(A / size, (z[:, kept] * weight).ravel(), rcond=1e-6)[0] / size)
+
+    def _covariance(self, J: Array, z: Array) -> Array:
+        """Covariance (k, k) by blocks of bumps (sandwich)."""
+        weight = self._weights(z)[:, None]
+        A, e = J * weight, z * weight
+        bread = np.linalg.pinv(np.einsum("icw,jcw->ij", A, A), rcond=1e-12)
+        each = np.einsum("icw,cw->iw", A, e)
+        score = np.zeros((len(J), int(self.block.max()) + 1))
+        np.add.at(score, (slice(None), self.block), each)
+        return np.asarray(bread @ (score @ score.T) @ bread)
+
+    def misfit(self, z: Array) -> float:
+        """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
+        return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
+
+    def gain(self, worse: Array, better: Array) -> tuple[float, float]:
+        """By how much the misfit of residuals (6, W) is lower than of others, and the standard error over blocks."""
+        squares = [z**2 + self.noise[:, None] ** 2 for z in (worse, better)]
+        a, b = (one.mean(axis=1) for one in squares)
+        level = np.where(np.abs(a / b - 1) > 1e-6, (a - b) / np.where(a == b, 1.0, np.log(a / b)), a)
+        each = ((squares[0] - squares[1]) / level[:, None]).sum(axis=0) * self.worth / 2 / len(self.block)
+        sums = np.bincount(self.block, each)
+        return float(sums.sum()), float(np.std(sums) * np.sqrt(len(sums))) + 1e-9
+
+
+def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
+    """A column at equal steps: an order holds from its row on; motion is averaged over a step, or goes on smoothly."""
+    if is_command(name):
+        return values[np.clip(np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1, 0, len(t) - 1)]
+    values = np.unwrap(values) if is_wrapped_angle(name) else values
+    step = grid[1] - grid[0]
+    if np.median(np.diff(t)) > 0.7 * step:
+        return np.asarray(CubicSpline(t, values)(grid))
+    total = cumulative_integral(t, values)
+    low, high = (np.clip(grid + side * step / 2, t[0], t[-1]) for side in (-1, 1))
+    return np.asarray((np.interp(high, t, total) - np.interp(low, t, total)) / (high - low))
+
+
+@lru_cache(maxsize=16)
+def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
+    """(state, memory, commands, environment, parameters) -> accelerations of u, v, r, at `count` instants."""
+    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
+    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
+    parameters, total = ca.SX.sym("parameters", len(model.parameters)), ca.SX(model.num_dof, 1)
+    for term in model.sums:
+        for entry in () if term.arrays is None else term.arrays:
+            total = total + term.function(*inputs, parameters, entry)
+    rates = model.rates(*inputs, parameters, total)
+    rows = [model.state.index(name) for name in ("u", "v", "r")]
+    return ca.Function("accelerations", [*inputs, parameters], [rates[rows]], {"cse": True}).map(
+        "mapped", "serial", count, [4], []
+    )
 
 
 def diagnose(vessel: Vessel, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
-    """Find what is wrong with a vessel and a log of it; runs : names, default: all."""
-    raise NotImplementedError
+    """Find what is wrong with a vessel and a log of it; runs : names, default: all.
+
+    Raises DataError where a command is missing, or no stretch is long enough.
+    """
+    log = _Log(vessel, dataset, list(dataset.runs if runs is None else runs))
+    causes = list_causes(log.vessel, log.model.commands, log.motion, log.scales)
+    none = log.estimate([], np.empty(0), log.motion)
+    return _judge(log, causes, none)
+
+
+def _judge(log: _Log, causes: Sequence[Cause], base: _Fit) -> Diagnosis:
+    """The best cause beside those of a fit, as a diagnosis with the next one beside it."""
+    fits = {
+        cause.key: log.estimate([*base.causes, cause], np.append(base.theta, np.zeros(len(cause.trial))), log.motion)
+        for cause in causes
+        if cause not in base.causes
+    }
+    if not fits:
+        return Diagnosis(NONE)
+    misfits = {key: log.misfit(fit.left_out) - log.misfit(base.left_out) for key, fit in fits.items()}
+    order = sorted(misfits, key=misfits.__getitem__)
+    best = fits[order[0]]
+    gain, error = log.gain(base.left_out, best.left_out)
+    before = log.path_error(base.motion)
+    share = 1 - log.path_error(best.motion) / before
+    cause, theta = best.causes[-1], best.theta[len(base.theta) :]
+    result = Diagnosis(NONE, share=share, misfits=dict(sorted(misfits.items(), key=lambda one: one[1])))
+    if gain < SURE * error or share < WORTH or (len(theta) and np.linalg.norm(theta) < cause.least):
+        return result
+
+    def family(key: str) -> str:
+        return key.partition(" / ")[0]
+
+    tied = [key for key in order[1:] if (pair := log.gain(fits[key].left_out, best.left_out))[0] < APART * pair[1]]
+    others = [key for key in tied if family(key) not in (family(cause.key), *cause.equals)]
+    if others:
+        return replace(result, cause=UNCLEAR, equals=tuple(dict.fromkeys(map(family, [cause.key, *tied]))))
+    spread = 1.96 * np.sqrt(np.diag(best.covariance))[len(base.theta) :]
+    interval = tuple(
+        tuple(sorted(pair)) for pair in zip(cause.sizes(theta - spread), cause.sizes(theta + spread), strict=True)
+    )
+    unfitted = [key for key in cause.equals if key not in fits]
+    equals = tuple(dict.fromkeys(one for one in [*map(family, tied), *unfitted] if one != family(cause.key)))
+    return replace(result, cause=family(cause.key), equals=equals, size=cause.sizes(theta), interval=interval)
