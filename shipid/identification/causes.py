@@ -45,7 +45,7 @@ class Motion:
     def earlier(self, names: Sequence[str], seconds: float) -> Motion:
         """The log with some columns moved to the time that they belong to, `seconds` [s] before they were logged."""
         moved = {name: np.array(self.columns[name]) for name in names}
-        for name, values in moved.items():
+        for values in moved.values():
             for part in self.stretches:
                 at = np.arange(part.stop - part.start, dtype=float)
                 values[part] = np.interp(at + seconds / self.step, at, values[part])
@@ -64,6 +64,7 @@ class Cause:
     least : a smaller size is what any log has. ratio : whether the size is the logarithm of a factor.
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
     repair : text with {0}, {1} for the size. equals : keys of its class. tells : the run that tells them apart.
+    cost : what its free signs add to the misfit. starts : sizes, beside none, from which the fit may begin.
     """
 
     key: str
@@ -76,6 +77,17 @@ class Cause:
     repair: str = ""
     equals: tuple[str, ...] = ()
     tells: str = ""
+    cost: float = 0.0
+    starts: tuple[float, ...] = ()
+
+    def repair_text(self, theta: Array) -> str:
+        """The repair with the size in it."""
+        text = self.repair
+        for i, size in enumerate(self.sizes(theta)):
+            ways = {f"{{minus{i}}}": -size, f"{{over{i}}}": 1 / size if size else 0.0, f"{{{i}}}": size}
+            for word, value in ways.items():
+                text = text.replace(word, f"{value:.4g}")
+        return text
 
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
@@ -152,6 +164,7 @@ def _command_causes(commands: Sequence[str], motion: Motion, scales: Scales) -> 
             (max(0.05 * scales.passing, 0.25 * scales.interval),),
             "s",
             least=max(1.01 * scales.interval, 0.03 * scales.passing),
+            starts=tuple(share * scales.passing for share in (0.3, 1.0, 2.0, 4.0)),
             repair=column + "# move this column {0} s earlier",
             equals=("slower actuator", "sensors early"),
             tells="a step of the command at rest, seen at the thruster",
@@ -254,6 +267,7 @@ def _sensor_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
             (max(0.03 * scales.passing, 0.25 * scales.interval),),
             "s",
             least=0.01 * scales.passing,
+            starts=tuple(share * scales.passing for share in (-1.0, -0.3, 0.3, 1.0, 2.0)),
             repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind or key}"\nseconds = {{0}}',
             equals={"position": ("lever arm position",), "u": ("sensor velocity delay",), "v": ("sensor velocity delay",), 
                     "velocity": ("sensor u delay", "sensor v delay")}.get(key, ()),

@@ -39,7 +39,7 @@ estimated without a part of the runs (or of the time, where there is one run) an
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -56,7 +56,7 @@ from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes
-from shipid.physics.signals import is_command, is_wrapped_angle
+from shipid.physics.signals import is_command, is_shaft, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -69,7 +69,9 @@ EXACT = 0.01  # of the size of the terms: what no resampled log says better
 AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
-SURE, APART, WORTH = 3.0, 2.0, 0.25  # standard errors; standard errors; share of the error of the path
+SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
+SURE, APART = 2.0, 2.0  # standard errors
+WORTH, WORTH_DISCRETE = 0.25, 0.05  # share of the error of the path; of a cause without a size, as a wrong sign
 CHANNELS = ("u", "v", "r", "psi", "along", "across")
 
 
@@ -131,7 +133,9 @@ class _Log:
         self.motion = self._resample(runs, stretches)
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
+        self._forces: Array | None = None
         self._memory: tuple[list[Array], Array] | None = None
+        self.memory(self.motion)
 
     def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
         parts: list[dict[str, Array]] = []
@@ -227,9 +231,20 @@ class _Log:
             columns[name] = values
         return columns | dict(body_velocities(columns))
 
-    def accelerations(self, motion: Motion) -> Array:
-        """Accelerations (3, n) by the physics of u, v, r at the steps that bumps use."""
-        columns, at, zero = self.states(motion), self.used, np.zeros(len(self.used))
+    def forces(self, motion: Motion) -> Array:
+        """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
+        names = ["u", "v", "r", *self.model.commands, *self.model.environment]
+        names += ["psi"] if any(motion.columns[name].any() for name in self.model.environment) else []
+        same = motion.parameters is self.motion.parameters
+        if not (same and all(motion.columns[name] is self.motion.columns[name] for name in names)):
+            return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        if self._forces is None:
+            self._forces = np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        return self._forces
+
+    def accelerations(self, motion: Motion, at: NDArray[np.intp]) -> Array:
+        """Accelerations (3, n) of u, v, r by the physics at n steps."""
+        columns, zero = self.states(motion), np.zeros(len(at))
         state = [
             columns[state_column(name)][at] if state_column(name) in columns else zero
             for name in (*self.model.state, *self.model.hidden)
@@ -244,7 +259,7 @@ class _Log:
     def residuals(self, motion: Motion) -> Array:
         """Residuals (6, W): measured change less predicted change, a unit of time."""
         columns, bumps = motion.columns, self.bumps
-        forces = self.accelerations(motion)[:, self.place] @ self.phi
+        forces = self.forces(motion)
         changes = [columns[name][bumps] @ self.pull for name in ("u", "v", "r", "psi", "north", "east")]
         velocity = (columns["u"] + 1j * columns["v"]) * np.exp(1j * columns["psi"])
         path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
@@ -284,6 +299,11 @@ class _Log:
 
         theta = np.array(start, dtype=float)
         motion, z = change(theta)
+        for begin in causes[-1].starts if causes else ():
+            other = np.append(theta[:-1], begin)
+            after, moved = change(other)
+            if self.misfit(moved) < self.misfit(z):
+                theta, motion, z = other, after, moved
         J = np.zeros((len(theta), *z.shape))
         for _ in range(ROUNDS if len(theta) else 0):
             J = np.array(
@@ -371,48 +391,102 @@ def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
     )
 
 
+def _likeliest_signs(astern: Array) -> Array:
+    """Signs (N,) of least misfit, where each change of the sign costs `SIGN` (Viterbi).
+
+    astern : (N,) by how much less the misfit is with -1.
+    """
+    cost, came = np.zeros(2), np.zeros((len(astern), 2), dtype=int)
+    for i, less in enumerate(astern):
+        came[i] = [int(cost[1] + SIGN < cost[0]), int(cost[1] <= cost[0] + SIGN)]
+        cost = np.minimum(cost, cost[::-1] + SIGN) - [0.0, less]
+    state, signs = int(np.argmin(cost)), np.ones(len(astern))
+    for i in range(len(astern) - 1, -1, -1):
+        signs[i] -= 2 * state
+        state = came[i, state]
+    return signs
+
+
+def _unsigned_shafts(log: _Log) -> Iterator[Cause]:
+    """Shafts whose speed may lack its sign: astern where u and r change as they do under a shaft that turns astern.
+
+    Pieces in which the sign is the same are found with it.
+    """
+    motion, every = log.motion, np.arange(len(log.motion.columns["u"]))
+    smooth, measured = log.states(motion), np.zeros((2, len(every)))
+    for part in motion.stretches:
+        measured[:, part] = [
+            np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r")
+        ]
+    for name in filter(is_shaft, log.model.commands):
+        values = motion.columns[name]
+        if values.min() < 0 or np.ptp(values) == 0:
+            continue
+        ahead, astern = (
+            (measured - log.accelerations(motion.put({name: sign * values}), every)[[0, 2]]) ** 2 for sign in (1, -1)
+        )
+        signs = np.ones(len(every))
+        for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
+            level = 1 / log._weights(log.residuals(motion.put({name: signs * values})))[[0, 2], None]
+            signs = _likeliest_signs(((ahead - astern) / level**2).sum(axis=0) / POINTS)
+        if (signs < 0).any():
+            yield Cause(
+                f"command {name} unsigned",
+                lambda m, _, name=name, signs=signs: m.put({name: signs * m.columns[name]}),
+                repair=f'[columns."{name}"]  # has no sign: give the column that says ahead or astern',
+                cost=float((np.diff(signs) != 0).sum()),
+            )
+
+
 def diagnose(vessel: Vessel, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
     """Find what is wrong with a vessel and a log of it; runs : names, default: all.
 
     Raises DataError where a command is missing, or no stretch is long enough.
     """
     log = _Log(vessel, dataset, list(dataset.runs if runs is None else runs))
-    causes = list_causes(log.vessel, log.model.commands, log.motion, log.scales)
+    causes = [*list_causes(log.vessel, log.model.commands, log.motion, log.scales), *_unsigned_shafts(log)]
     none = log.estimate([], np.empty(0), log.motion)
-    return _judge(log, causes, none)
+    first, fit = _judge(log, causes, none)
+    if fit is None:
+        return first
+    return replace(first, next=_judge(log, causes, fit)[0])
 
 
-def _judge(log: _Log, causes: Sequence[Cause], base: _Fit) -> Diagnosis:
-    """The best cause beside those of a fit, as a diagnosis with the next one beside it."""
+def _judge(log: _Log, causes: Sequence[Cause], base: _Fit) -> tuple[Diagnosis, _Fit | None]:
+    """The best cause beside those of a fit as a diagnosis, with its fit where it is named."""
     fits = {
         cause.key: log.estimate([*base.causes, cause], np.append(base.theta, np.zeros(len(cause.trial))), log.motion)
         for cause in causes
         if cause not in base.causes
     }
-    if not fits:
-        return Diagnosis(NONE)
-    misfits = {key: log.misfit(fit.left_out) - log.misfit(base.left_out) for key, fit in fits.items()}
+    costs = {cause.key: cause.cost for cause in causes}
+    misfits = {key: log.misfit(fit.left_out) + costs[key] - log.misfit(base.left_out) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     best = fits[order[0]]
     gain, error = log.gain(base.left_out, best.left_out)
-    before = log.path_error(base.motion)
-    share = 1 - log.path_error(best.motion) / before
+    share = 1 - log.path_error(best.motion) / log.path_error(base.motion)
     cause, theta = best.causes[-1], best.theta[len(base.theta) :]
-    result = Diagnosis(NONE, share=share, misfits=dict(sorted(misfits.items(), key=lambda one: one[1])))
-    if gain < SURE * error or share < WORTH or (len(theta) and np.linalg.norm(theta) < cause.least):
-        return result
-
-    def family(key: str) -> str:
-        return key.partition(" / ")[0]
-
+    result = Diagnosis(NONE, share=share, misfits={key: misfits[key] for key in order})
+    if (
+        gain < SURE * error
+        or misfits[order[0]] > 0
+        or share < WORTH
+        or (len(theta) and np.linalg.norm(theta) < cause.least)
+    ):
+        return result, None
     tied = [key for key in order[1:] if (pair := log.gain(fits[key].left_out, best.left_out))[0] < APART * pair[1]]
-    others = [key for key in tied if family(key) not in (family(cause.key), *cause.equals)]
-    if others:
-        return replace(result, cause=UNCLEAR, equals=tuple(dict.fromkeys(map(family, [cause.key, *tied]))))
+    near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
+    name = cause.key.partition(" / ")[0]
+    if set(near) - {name, *cause.equals}:
+        return replace(result, cause=UNCLEAR, equals=(name, *(key for key in near if key != name))), None
     spread = 1.96 * np.sqrt(np.diag(best.covariance))[len(base.theta) :]
-    interval = tuple(
-        tuple(sorted(pair)) for pair in zip(cause.sizes(theta - spread), cause.sizes(theta + spread), strict=True)
-    )
+    ends = (cause.sizes(theta - spread), cause.sizes(theta + spread))
     unfitted = [key for key in cause.equals if key not in fits]
-    equals = tuple(dict.fromkeys(one for one in [*map(family, tied), *unfitted] if one != family(cause.key)))
-    return replace(result, cause=family(cause.key), equals=equals, size=cause.sizes(theta), interval=interval)
+    return replace(
+        result,
+        cause=name,
+        equals=tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name),
+        size=cause.sizes(theta),
+        interval=tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True)),
+        repair=cause.repair_text(theta),
+    ), best
