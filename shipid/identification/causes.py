@@ -375,7 +375,6 @@ def _coefficient_causes(vessel: Vessel) -> Iterator[Cause]:
         "mass": [p for p in names if p in ("inertia.m", "inertia.I_z") or p.startswith("added_mass.")],
         "thrust": [p for p in names if is_thrust(p)],
         "rudder": [p for p in names if _is_rudder_force(p)],
-        "wind": [p for p in names if p.startswith("wind.A_")],
     }
     equals = {
         "damping": ("coefficient thrust", "coefficient mass"),

@@ -69,6 +69,7 @@ EXACT = 0.01  # of the size of the terms: what no resampled log says better
 AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
+FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
 WORTH, WORTH_DISCRETE = 0.25, 0.05  # share of the error of the path; of a cause without a size, as a wrong sign
@@ -100,13 +101,12 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Causes fitted together: the residuals (6, W) at their sizes (k,), those on parts left out, and the covariance."""
+    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it."""
 
-    causes: tuple[Cause, ...]
+    cause: Cause
     theta: Array
-    residuals: Array
+    errors: Array
     left_out: Array
-    covariance: Array
     motion: Motion
 
 
@@ -133,9 +133,13 @@ class _Log:
         self.motion = self._resample(runs, stretches)
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
-        self._forces: Array | None = None
-        self._memory: tuple[list[Array], Array] | None = None
-        self.memory(self.motion)
+        self.repair(self.motion)
+
+    def repair(self, motion: Motion) -> None:
+        """Take another motion for the log, whose actuators and forces are kept."""
+        self.motion, self._kept = motion, None
+        memory = self.memory(motion)
+        self._kept = memory, np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
 
     def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
         parts: list[dict[str, Array]] = []
@@ -177,6 +181,7 @@ class _Log:
         self.paths = np.concatenate(
             [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
         ).astype(int)
+        self.path_block = self.block[np.clip(np.searchsorted(begin, self.paths), 0, len(begin) - 1)]
         s = np.linspace(-1, 1, POINTS + 1)
         phi, slope = (1 - s**2) ** 3, -s * (1 - s**2) ** 2
         self.phi, t = phi / phi.sum(), self.step * np.arange(POINTS + 1)
@@ -202,23 +207,21 @@ class _Log:
         velocity = [pulled * white(name) for name in ("u", "v", "r")]
         place = pulled * max(white("north"), white("east"))
         heading = summed * speed * white("psi")
+        self.blur = float(np.hypot(max(white("north"), white("east")), 0.1 * EXACT * self.scales.length))
         noise = [*velocity, np.hypot(pulled * white("psi"), summed * white("r")),
                  np.hypot(place, summed * white("u")), np.hypot(np.hypot(place, heading), summed * white("v"))]  # fmt: skip
         return np.hypot(noise, EXACT * 0.1 * sizes)
 
     def memory(self, motion: Motion) -> Array:
         """Actuator states (M, N) that the orders of a log reach."""
-        orders = [motion.columns[name] for name in self.model.commands]
-        if self._memory is not None and all(a is b for a, b in zip(orders, self._memory[0], strict=True)):
-            return self._memory[1]
+        orders = {name: motion.columns[name] for name in self.model.commands}
+        if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
+            return self._kept[0]
         result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
-        if self.model.memory:
-            for part in motion.stretches:
-                given = {name: values[part] for name, values in zip(self.model.commands, orders, strict=True)}
-                reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
-                result[:, part] = np.array([reached[name] for name in self.model.memory])
-        if self._memory is None:
-            self._memory = orders, result
+        for part in motion.stretches if self.model.memory else ():
+            given = {name: values[part] for name, values in orders.items()}
+            reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
+            result[:, part] = np.array([reached[name] for name in self.model.memory])
         return result
 
     def states(self, motion: Motion) -> dict[str, Array]:
@@ -235,26 +238,25 @@ class _Log:
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
         names = ["u", "v", "r", *self.model.commands, *self.model.environment]
         names += ["psi"] if any(motion.columns[name].any() for name in self.model.environment) else []
-        same = motion.parameters is self.motion.parameters
-        if not (same and all(motion.columns[name] is self.motion.columns[name] for name in names)):
-            return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
-        if self._forces is None:
-            self._forces = np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
-        return self._forces
+        same = self._kept is not None and motion.parameters is self.motion.parameters
+        if self._kept is not None and same and all(motion.columns[name] is self.motion.columns[name] for name in names):
+            return self._kept[1]
+        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
 
     def accelerations(self, motion: Motion, at: NDArray[np.intp]) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
-        columns, zero = self.states(motion), np.zeros(len(at))
-        state = [
-            columns[state_column(name)][at] if state_column(name) in columns else zero
-            for name in (*self.model.state, *self.model.hidden)
-        ]
-        inputs = [np.array(state), self.memory(motion)[:, at]]
+        columns = self.states(motion)
+        inputs = [self._start(columns, at), self.memory(motion)[:, at]]
         inputs += [
             np.array([columns[name][at] for name in names]).reshape(-1, len(at))
             for names in (self.model.commands, self.model.environment)
         ]
         return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
+
+    def _start(self, columns: Mapping[str, Array], at: NDArray[np.intp]) -> Array:
+        """States (., n) at n steps; those that no column has are 0."""
+        names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
+        return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
 
     def residuals(self, motion: Motion) -> Array:
         """Residuals (6, W): measured change less predicted change, a unit of time."""
@@ -267,50 +269,41 @@ class _Log:
             [*(np.array(changes[:3]) - forces), changes[3] - columns["r"][bumps] @ self.phi, path.real, path.imag]
         )
 
-    def path_error(self, motion: Motion) -> float:
-        """Mean error [m] of the paths that the physics predicts over 2.5 ship lengths."""
+    def path_errors(self, motion: Motion) -> Array:
+        """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
         columns, at = self.states(motion), self.paths
         rows = at + np.arange(AHEAD + 1)[:, None]
-        start = {
-            name: columns[state_column(name)][at] if state_column(name) in columns else np.zeros(len(at))
-            for name in (*self.model.state, *self.model.hidden)
-        }
-        memory = dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True))
-        goal = np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1)
         found = rollout_distances(
-            self.vessel, start, {name: columns[name][rows[:-1]] for name in self.model.commands},
-            {name: columns[name][rows[:-1]] for name in self.model.environment}, goal,
-            step=self.step, method="rk4", parameters=motion.parameters[None], memory=memory,
-        )  # fmt: skip
-        error = found.total[0] / AHEAD
-        return float(np.where(found.diverged[0], self.scales.length * 10, error).mean())
+            self.vessel,
+            dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
+            {name: columns[name][rows[:-1]] for name in self.model.commands},
+            {name: columns[name][rows[:-1]] for name in self.model.environment},
+            np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1),
+            step=self.step,
+            method="rk4",
+            parameters=motion.parameters[None],
+            memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
+        )
+        far = LOST * self.scales.length
+        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / AHEAD, far)))
 
-    def estimate(self, causes: Sequence[Cause], start: Array, base: Motion) -> _Fit:
-        """Fit causes together by Gauss-Newton from a start; one that lowers nothing stays there."""
-        trials = np.array([trial for cause in causes for trial in cause.trial])
-        ends = np.cumsum([0, *(len(cause.trial) for cause in causes)])
+    def estimate(self, cause: Cause) -> _Fit:
+        """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
+        trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
-            motion, scaled = base, np.ones(6)
-            for cause, first, last in zip(causes, ends[:-1], ends[1:], strict=True):
-                motion = cause.change(motion, theta[first:last])
-                scaled[list(cause.scaled)] *= np.exp(theta[first]) if cause.scaled else 1.0
-            return motion, self.residuals(motion) * scaled[:, None]
+            motion = cause.change(self.motion, theta)
+            z = self.residuals(motion)
+            if cause.scaled:
+                z[list(cause.scaled)] *= np.exp(theta[0])
+            return motion, z
 
-        theta = np.array(start, dtype=float)
-        motion, z = change(theta)
-        for begin in causes[-1].starts if causes else ():
-            other = np.append(theta[:-1], begin)
-            after, moved = change(other)
-            if self.misfit(moved) < self.misfit(z):
-                theta, motion, z = other, after, moved
+        begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
+        theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
         J = np.zeros((len(theta), *z.shape))
         for _ in range(ROUNDS if len(theta) else 0):
-            J = np.array(
-                [(change(theta + trials * (np.arange(len(theta)) == i))[1] - z) / trials[i] for i in range(len(theta))]
-            )
-            step = self._step(J, z, np.ones(z.shape[1], dtype=bool))
-            step = np.clip(step, -20 * trials, 20 * trials)
+            J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
+            step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
             before = self.misfit(z)
             for _ in range(HALVINGS):
                 after, moved = change(theta + step)
@@ -327,7 +320,7 @@ class _Log:
             out = self.fold == fold
             if out.any() and not out.all():
                 left[:, out] += np.tensordot(self._step(J, z, ~out), J[:, :, out], 1)
-        return _Fit(tuple(causes), theta, z, left, self._covariance(J, z), motion)
+        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
 
     def _weights(self, z: Array) -> Array:
         return np.asarray(1 / np.sqrt((z**2).mean(axis=1) + self.noise**2))
@@ -352,13 +345,20 @@ class _Log:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
         return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
 
-    def gain(self, worse: Array, better: Array) -> tuple[float, float]:
-        """By how much the misfit of residuals (6, W) is lower than of others, and the standard error over blocks."""
-        squares = [z**2 + self.noise[:, None] ** 2 for z in (worse, better)]
-        a, b = (one.mean(axis=1) for one in squares)
-        level = np.where(np.abs(a / b - 1) > 1e-6, (a - b) / np.where(a == b, 1.0, np.log(a / b)), a)
-        each = ((squares[0] - squares[1]) / level[:, None]).sum(axis=0) * self.worth / 2 / len(self.block)
-        sums = np.bincount(self.block, each)
+    def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
+        """By how much one misfit is lower than another, and the standard error over blocks of time.
+
+        worse, better : residuals (6, W), errors of paths (K,).
+        """
+        sums = np.zeros(int(self.block.max()) + 1)
+        for a, b, block, weight in (
+            (*(z[0] ** 2 + self.noise[:, None] ** 2 for z in (worse, better)), self.block, self.worth / 2),
+            (*(z[1][None] ** 2 + self.blur**2 for z in (worse, better)), self.path_block, self.worth),
+        ):
+            ratio = a.mean(axis=1) / b.mean(axis=1)
+            level = b.mean(axis=1) * np.where(np.abs(ratio - 1) > 1e-6, (ratio - 1) / np.log(ratio), 1.0)
+            each = ((a - b) / level[:, None]).sum(axis=0) * weight / a.shape[1]
+            sums += np.bincount(block, each, len(sums))
         return float(sums.sum()), float(np.std(sums) * np.sqrt(len(sums))) + 1e-9
 
 
@@ -445,42 +445,37 @@ def diagnose(vessel: Vessel, dataset: Dataset, runs: Sequence[str] | None = None
     """
     log = _Log(vessel, dataset, list(dataset.runs if runs is None else runs))
     causes = [*list_causes(log.vessel, log.model.commands, log.motion, log.scales), *_unsigned_shafts(log)]
-    none = log.estimate([], np.empty(0), log.motion)
-    first, fit = _judge(log, causes, none)
-    if fit is None:
+    first, cause = _judge(log, causes)
+    if cause is None:
         return first
-    return replace(first, next=_judge(log, causes, fit)[0])
+    log.repair(log.estimate(cause).motion)
+    return replace(first, next=_judge(log, [one for one in causes if one.key != cause.key])[0])
 
 
-def _judge(log: _Log, causes: Sequence[Cause], base: _Fit) -> tuple[Diagnosis, _Fit | None]:
-    """The best cause beside those of a fit as a diagnosis, with its fit where it is named."""
-    fits = {
-        cause.key: log.estimate([*base.causes, cause], np.append(base.theta, np.zeros(len(cause.trial))), log.motion)
-        for cause in causes
-        if cause not in base.causes
-    }
-    costs = {cause.key: cause.cost for cause in causes}
-    misfits = {key: log.misfit(fit.left_out) + costs[key] - log.misfit(base.left_out) for key, fit in fits.items()}
+def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]:
+    """The best of all causes as a diagnosis, and the cause where it is named."""
+    fits = {cause.key: log.estimate(cause) for cause in causes}
+    base = log.residuals(log.motion)
+    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
+    plain = base, log.path_errors(log.motion)
+    seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
+    misfits |= {key: fits[key].cause.cost - log.gain(plain, one)[0] for key, one in seen.items()}
+    order = sorted(seen, key=misfits.__getitem__)
     best = fits[order[0]]
-    gain, error = log.gain(base.left_out, best.left_out)
-    share = 1 - log.path_error(best.motion) / log.path_error(base.motion)
-    cause, theta = best.causes[-1], best.theta[len(base.theta) :]
-    result = Diagnosis(NONE, share=share, misfits={key: misfits[key] for key in order})
-    if (
-        gain < SURE * error
-        or misfits[order[0]] > 0
-        or share < WORTH
-        or (len(theta) and np.linalg.norm(theta) < cause.least)
-    ):
+    cause, theta = best.cause, best.theta
+    gain, error = log.gain(plain, seen[order[0]])
+    share = 1 - float(seen[order[0]][1].mean() / plain[1].mean())
+    result = Diagnosis(NONE, share=share, misfits=misfits)
+    shown = gain > SURE * error and misfits[order[0]] < 0 and share > (WORTH if cause.trial else WORTH_DISCRETE)
+    if not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
-    tied = [key for key in order[1:] if (pair := log.gain(fits[key].left_out, best.left_out))[0] < APART * pair[1]]
+    tied = [key for key in order[1:] if (pair := log.gain(seen[key], seen[order[0]]))[0] < APART * pair[1]]
     near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
     name = cause.key.partition(" / ")[0]
     if set(near) - {name, *cause.equals}:
         return replace(result, cause=UNCLEAR, equals=(name, *(key for key in near if key != name))), None
-    spread = 1.96 * np.sqrt(np.diag(best.covariance))[len(base.theta) :]
-    ends = (cause.sizes(theta - spread), cause.sizes(theta + spread))
+    ends = (cause.sizes(theta - 1.96 * best.errors), cause.sizes(theta + 1.96 * best.errors))
     unfitted = [key for key in cause.equals if key not in fits]
     return replace(
         result,
@@ -489,4 +484,4 @@ def _judge(log: _Log, causes: Sequence[Cause], base: _Fit) -> tuple[Diagnosis, _
         size=cause.sizes(theta),
         interval=tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True)),
         repair=cause.repair_text(theta),
-    ), best
+    ), cause
