@@ -18,8 +18,6 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.units import join_names, plural_word
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identification
     from shipid.identification.settings import Identify
@@ -213,7 +211,6 @@ def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     answer.records("manoeuvres", compared.manoeuvres, MEASURE | heads, shown=compared.manoeuvres[measured])
     answer.say("between: range over the structures not shown to be worse; within: the widest interval of one of them")
     answer.records("spread", compared.spread, MEASURE | {"spread": "between", "width": "within"})
-    _show_groups(compared.groups, f"of {compared.chosen}, on runs that the fit has not seen", answer)
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
     notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & ~measured]
     answer.warn(
@@ -223,16 +220,6 @@ def _show_structures(compared: StructureComparison, answer: Answer) -> None:
             *(f"{row['structure']}, {row['manoeuvre']}: {row['note']}" for row in notes.to_dict("records")),
         ]
     )
-
-
-def _show_groups(groups: DataFrame, whose: str, answer: Answer) -> None:
-    """Print errors by side, helm and speed, if there are any."""
-    from shipid.identification.sides import HEADS, side_table_rows
-
-    if len(groups):
-        answer.say(f"Errors by side, helm and speed {whose}:")
-        rows = [dict(zip(HEADS, row, strict=True)) for row in side_table_rows(groups)]
-        answer.records("groups", groups, shown=rows)
 
 
 def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
@@ -273,7 +260,6 @@ def _show_identified(outcome: Identification, answer: Answer) -> None:
     heads = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before", "after": "after"}
     answer.records("outputs", outcome.outputs, heads)
     _show_manoeuvres(outcome, answer)
-    _show_groups(outcome.groups, f"on {'runs held out' if outcome.held_out else 'the fitted runs'}", answer)
     worth = outcome.solution.effective
     if worth:
         words = ", ".join(f"{name} {count:.0f}" for name, count in worth.items())

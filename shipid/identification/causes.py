@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.identification.sensitivities import is_thrust
@@ -17,8 +18,9 @@ from shipid.vessel.schema import SHARED
 
 VELOCITY, POSITION = ("u", "v"), ("north", "east")
 GEOMETRY = frozenset((*SHARED, "x_aft", "x_fwd", "L_pp", "T", "rho", "nabla"))
-RUDDER_NUMBERS = ("f_alpha", "k_f", "k_X", "k_Y", "k_N")
-"""Numbers of a rudder in which its force is linear; besides them derivatives by `delta`."""
+LATE, EARLY = (0.3, 1.0, 2.0, 4.0), (-1.0, -0.3)  # delays from which a fit may begin, in times of a ship length
+SPEEDS, COURSES = "runs at several speeds", "runs on opposite courses"
+BESIDE = "the command read beside its instrument"
 
 
 @dataclass(frozen=True)
@@ -34,25 +36,23 @@ class Motion:
     runs: tuple[int, ...]
     step: float
 
-    def changed(self, **columns: Array) -> Motion:
-        """The same log with some columns replaced; a dot in a name is written as two underscores."""
-        return replace(self, columns={**self.columns, **{name.replace("__", "."): x for name, x in columns.items()}})
-
     def put(self, columns: Mapping[str, Array]) -> Motion:
         """The same log with some columns replaced."""
         return replace(self, columns={**self.columns, **columns})
 
-    def earlier(self, names: Sequence[str], seconds: float) -> Motion:
-        """The log with some columns moved to the time that they belong to, `seconds` [s] before they were logged."""
-        moved = {name: np.array(self.columns[name]) for name in names}
-        for values in moved.values():
-            for part in self.stretches:
-                at = np.arange(part.stop - part.start, dtype=float)
-                values[part] = np.interp(at + seconds / self.step, at, values[part])
-        return self.put(moved)
 
+@dataclass(frozen=True)
+class Scales:
+    """Length [m], speed [m/s] and interval of the rows [s] of a log, which set the size of trials."""
 
-Change = Callable[[Motion, Array], Motion]
+    length: float
+    speed: float
+    interval: float
+
+    @property
+    def passing(self) -> float:
+        """Time [s] in which the ship runs its length."""
+        return self.length / self.speed
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,13 @@ class Cause:
         for each entry of the size; empty for a cause without a size. unit : of the size.
     least : a smaller size is what any log has. ratio : whether the size is the logarithm of a factor.
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
-    repair : text with {0}, {1} for the size. equals : keys of its class. tells : the run that tells them apart.
-    cost : what its free signs add to the misfit. starts : sizes, beside none, from which the fit may begin.
+    repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
+    equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
+    cost : what its free signs add to the misfit.
     """
 
     key: str
-    change: Change
+    change: Callable[[Motion, Array], Motion]
     trial: tuple[float, ...] = ()
     unit: str = ""
     least: float = 0.0
@@ -77,229 +78,80 @@ class Cause:
     repair: str = ""
     equals: tuple[str, ...] = ()
     tells: str = ""
-    cost: float = 0.0
     starts: tuple[float, ...] = ()
-
-    def repair_text(self, theta: Array) -> str:
-        """The repair with the size in it."""
-        text = self.repair
-        for i, size in enumerate(self.sizes(theta)):
-            ways = {f"{{minus{i}}}": -size, f"{{over{i}}}": 1 / size if size else 0.0, f"{{{i}}}": size}
-            for word, value in ways.items():
-                text = text.replace(word, f"{value:.4g}")
-        return text
+    cost: float = 0.0
 
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
-        return tuple(np.exp(theta).tolist() if self.ratio else np.asarray(theta).tolist())
+        return tuple((np.exp(theta) if self.ratio else theta).tolist())
 
-
-@dataclass(frozen=True)
-class Scales:
-    """Length [m], speed [m/s] and interval of the rows [s] of a log, which set the size of trials."""
-
-    length: float
-    speed: float
-    interval: float
-    angle: float = field(default=0.02)
-
-    @property
-    def passing(self) -> float:
-        """Time [s] in which the ship runs its length."""
-        return self.length / self.speed
+    def repair_text(self, theta: Array) -> str:
+        """The repair with the size in it."""
+        words = dict[str, float]()
+        for i, size in enumerate(self.sizes(theta)):
+            words |= {f"{{minus{i}}}": -size, f"{{over{i}}}": 1 / (size or np.inf), f"{{{i}}}": size}
+        text = self.repair
+        for word, value in words.items():
+            text = text.replace(word, f"{value:.4g}")
+        return text
 
 
 def list_causes(vessel: Vessel, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
     """All causes that a vessel and a log can have."""
     moving = [name for name in commands if np.ptp(motion.columns[name]) > 0]
     return [
-        *_command_causes(moving, motion, scales),
+        *(cause for name in moving for cause in _command_causes(name, motion.columns[name], scales)),
         *_exchanged_thrusters(commands, motion),
-        *_sensor_causes(motion, scales),
+        *_sensor_causes(scales),
         *_water_causes(motion, scales),
         *_coefficient_causes(vessel),
     ]
 
 
-def _command_causes(commands: Sequence[str], motion: Motion, scales: Scales) -> Iterator[Cause]:
-    for name in commands:
-        values = motion.columns[name]
-        size = float(np.sqrt(np.mean(values**2)))
-        column = f'[columns."{name}"]\n'
-        angle = is_steering(name)
-        unit = "rad" if angle else "rev/s" if is_shaft(name) else ""
-        strength = ("coefficient rudder",) if angle else ("coefficient thrust", "coefficient damping")
-        zero = ("asymmetry of hull or screw",) if angle else ()
-        yield Cause(
-            f"command {name} zero",
-            lambda m, x, name=name: m.put({name: m.columns[name] - x[0]}),
-            (0.05 * size,),
-            unit,
-            least=0.003 if angle else 0.01 * size,
-            repair=column + "offset = {minus0}  # " + unit + ", added to what is there",
-            equals=zero,
-            tells="the rudder's angle read with the ship on a slip, or a run at another speed",
-        )
-        yield Cause(
-            f"command {name} scale",
-            lambda m, x, name=name: m.put({name: m.columns[name] / np.exp(x[0])}),
-            (0.05,),
-            "1",
-            least=0.02,
-            ratio=True,
-            repair=column + "factor = {over0}  # times what is there",
-            equals=strength,
-            tells="the command read beside its instrument",
-        )
-        yield Cause(
-            f"command {name} sign",
-            lambda m, x, name=name: m.put({name: -m.columns[name]}),
-            repair=column + "sign = -1  # times what is there",
-            equals=("mirror image of the motion",) if angle else (),
-            tells="one turn whose side is known",
-        )
-        yield Cause(
-            f"command {name} delay",
-            lambda m, x, name=name: m.earlier([name], x[0]),
-            (max(0.05 * scales.passing, 0.25 * scales.interval),),
-            "s",
-            least=max(1.01 * scales.interval, 0.03 * scales.passing),
-            starts=tuple(share * scales.passing for share in (0.3, 1.0, 2.0, 4.0)),
-            repair=column + "# move this column {0} s earlier",
-            equals=("slower actuator", "sensors early"),
-            tells="a step of the command at rest, seen at the thruster",
-        )
-        if is_shaft(name) and (values < 0).any() and (values > 0).any():
-            yield Cause(
-                f"command {name} scale astern",
-                lambda m, x, name=name: m.put({
-                    name: np.where(m.columns[name] < 0, m.columns[name] / np.exp(x[0]), m.columns[name])
-                }),
-                (0.05,),
-                "1",
-                least=0.05,
-                ratio=True,
-                repair=column + "# times {over0} where it is below 0",
-                equals=("coefficient thrust astern",),
-                tells="the shaft read astern",
-            )  # fmt: skip
+def _subtract(name: str, motion: Motion, size: Array) -> Motion:
+    return motion.put({name: motion.columns[name] - size[0]})
 
 
-def _exchanged_thrusters(commands: Sequence[str], motion: Motion) -> Iterator[Cause]:
-    signals: dict[str, set[str]] = {}
-    for name in commands:
-        signals.setdefault(name.rpartition(".")[0], set()).add(signal_of(name))
-    for a, b in combinations(signals, 2):
-        names = [(f"{a}.{one}", f"{b}.{one}") for one in sorted(signals[a] & signals[b])]
-        if signals[a] == signals[b] and any((motion.columns[x] != motion.columns[y]).any() for x, y in names):
-            yield Cause(
-                f"exchange {a} {b}",
-                lambda m, x, names=names: m.put({
-                    one: m.columns[other] for pair in names for one, other in (pair, pair[::-1])
-                }),
-                repair=f"exchange the columns of {a} and {b} in the mapping",
-                equals=("command sign of both",),
-                tells="a run with one of the two alone",
-            )  # fmt: skip
+def _divide(names: Sequence[str], motion: Motion, size: Array) -> Motion:
+    return motion.put({name: motion.columns[name] * np.exp(-size[0]) for name in names})
 
 
-def _sensor_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
-    speed, rate = scales.speed, scales.speed / scales.length
-    size = {"u": speed, "v": speed, "r": rate, "psi": 1.0}
-    units = {"u": "m/s", "v": "m/s", "r": "rad/s", "psi": "rad"}
-    equals = {
-        "u": ("sensor u scale", "sensor velocity scale", "velocity through water"),
-        "v": ("sensor psi bias", "velocity through water"),
-        "r": (),
-        "psi": ("positions in turned axes", "sensor v bias", "velocity through water", "current"),
-    }
-    for name in ("u", "v", "r", "psi"):
-        yield Cause(
-            f"sensor {name} bias",
-            lambda m, x, name=name: m.put({name: m.columns[name] - x[0]}),
-            (0.02 * size[name],),
-            units[name],
-            least=0.003 * size[name],
-            repair=f"[columns.{name}]\noffset = {{minus0}}  # {units[name]}, added to what is there",
-            equals=equals[name],
-            tells="runs on opposite courses and at several speeds",
-        )
-    yield Cause(
-        "sensor psi bias / with velocities",
-        lambda m, x: m.put(_turned_velocity(m.columns, x[0])),
-        (0.02,),
-        "rad",
-        least=0.003,
-        repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
-        equals=("sensor v bias", "current"),
-        tells="runs on opposite courses and at several speeds",
-    )
-    for names, key, rows in (
-        (("u",), "u", (0, 4)), (("v",), "v", (1,)), (("r",), "r", (2, 3)), (VELOCITY, "velocity", (0, 1, 4, 5)),
-    ):  # fmt: skip
-        yield Cause(
-            f"sensor {key} scale",
-            lambda m, x, names=names: m.put({name: m.columns[name] / np.exp(x[0]) for name in names}),
-            (0.03,),
-            "1",
-            least=0.01,
-            ratio=True,
-            scaled=rows,
-            repair="[[repair]]\n" + f'kind = "scale"\ncolumns = {[*names]}\n' + "factor = {over0}",
-            equals=("sensor u bias", "sensor velocity scale", "sensor u scale", "velocity through water")
-            if key in ("u", "velocity")
-            else (),
-            tells="runs at several speeds",
-        )
-    for name in ("v", "r", "psi"):
-        yield Cause(
-            f"sensor {name} sign",
-            lambda m, x, name=name: m.put({name: -m.columns[name]}),
-            repair=f"[columns.{name}]\nsign = -1  # times what is there",
-        )
-    for names, key, kind in (
-        (("u",), "u", ""), (("v",), "v", ""), (("r",), "r", "yaw rate"), (("psi",), "psi", "heading"),
-        (VELOCITY, "velocity", "velocity"), (POSITION, "position", "position"),
-    ):  # fmt: skip
-        yield Cause(
-            f"sensor {key} delay",
-            lambda m, x, names=names: m.earlier(names, x[0]),
-            (max(0.03 * scales.passing, 0.25 * scales.interval),),
-            "s",
-            least=0.01 * scales.passing,
-            starts=tuple(share * scales.passing for share in (-1.0, -0.3, 0.3, 1.0, 2.0)),
-            repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind or key}"\nseconds = {{0}}',
-            equals={"position": ("lever arm position",), "u": ("sensor velocity delay",), "v": ("sensor velocity delay",), 
-                    "velocity": ("sensor u delay", "sensor v delay")}.get(key, ()),
-            tells="turns to both sides",
-        )  # fmt: skip
-    yield Cause("heading is course", _heading_from_course, repair="name the column of a gyro or a compass as psi")
-    for moves in ("position", "velocity", "position and velocity"):
-        yield Cause(
-            f"lever arm {moves}",
-            lambda m, x, moves=moves: _to_origin(m, x, moves),
-            (0.05 * scales.length, 0.05 * scales.length),
-            "m",
-            least=0.02 * scales.length,
-            repair='[[repair]]\nkind = "lever_arm"\nx = {0}\ny = {1}\nmoves = '
-            + f'"{"both" if "and" in moves else moves}"',
-            equals=("sensor position delay",) if moves == "position" else (),
-            tells="turns to both sides at several speeds",
-        )
+def _divide_astern(name: str, motion: Motion, size: Array) -> Motion:
+    values = motion.columns[name]
+    return motion.put({name: np.where(values < 0, values * np.exp(-size[0]), values)})
 
 
-def _turned_velocity(columns: Mapping[str, Array], bias: float) -> dict[str, Array]:
-    turned = (columns["u"] + 1j * columns["v"]) * np.exp(1j * bias)
-    return {"psi": columns["psi"] - bias, "u": turned.real, "v": turned.imag}
+def _negate(name: str, motion: Motion, _: Array) -> Motion:
+    return motion.put({name: -motion.columns[name]})
+
+
+def _advance(names: Sequence[str], motion: Motion, size: Array) -> Motion:
+    """The log with columns moved to the time that they belong to, `size` [s] before they were logged."""
+    moved = {name: np.array(motion.columns[name]) for name in names}
+    for values in moved.values():
+        for part in motion.stretches:
+            at = np.arange(part.stop - part.start, dtype=float)
+            values[part] = np.interp(at + size[0] / motion.step, at, values[part])
+    return motion.put(moved)
+
+
+def _exchange(pairs: Sequence[tuple[str, str]], motion: Motion, _: Array) -> Motion:
+    return motion.put({a: motion.columns[b] for pair in pairs for a, b in (pair, pair[::-1])})
+
+
+def _turn_heading(motion: Motion, size: Array) -> Motion:
+    """The heading less a bias, and velocities turned with it: those over ground stay."""
+    columns = motion.columns
+    turned = (columns["u"] + 1j * columns["v"]) * np.exp(1j * size[0])
+    return motion.put({"psi": columns["psi"] - size[0], "u": turned.real, "v": turned.imag})
 
 
 def _heading_from_course(motion: Motion, _: Array) -> Motion:
     columns = motion.columns
-    drift = np.arctan2(columns["v"], columns["u"])
-    return motion.put({"psi": columns["psi"] - drift})
+    return motion.put({"psi": columns["psi"] - np.arctan2(columns["v"], columns["u"])})
 
 
-def _to_origin(motion: Motion, arm: Array, moves: str) -> Motion:
+def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
     """The log of the origin, where it is of a point (x, y) [m] ahead and to starboard."""
     columns, (x, y), moved = motion.columns, arm, dict[str, Array]()
     if "position" in moves:
@@ -310,94 +162,173 @@ def _to_origin(motion: Motion, arm: Array, moves: str) -> Motion:
     return motion.put(moved)
 
 
-def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
-    trial, count = 0.03 * scales.speed, max(motion.runs) + 1
-    run_of = np.concatenate([np.full(part.stop - part.start, run) for part, run in zip(motion.stretches, motion.runs, strict=True)])  # fmt: skip
-    drift = ("sensor psi bias", "sensor v bias", "wind that the log lacks")
-    how: dict[str, Any] = {"unit": "m/s", "least": 0.01 * scales.speed}
-    how |= {"tells": "runs on opposite courses", "equals": (*drift, "current by run", "velocity through water")}
-    yield Cause(
-        "current",
-        lambda m, x: _in_current(m, np.full(len(run_of), x[0] + 1j * x[1])),
-        (trial, trial),
-        repair="--set current=one  # north {0}, east {1} m/s",
-        **how,
-    )
-    if count > 1:
-        yield Cause(
-            "current by run",
-            lambda m, x: _in_current(m, (x[:count] + 1j * x[count:])[run_of]),
-            2 * count * (trial,),
-            repair='--set current="by run"',
-            **how | {"equals": (*drift, "current", "velocity through water")},
-        )
-    yield Cause(
-        "velocity through water",
-        lambda m, x: m.put(_over_ground(m.columns, x[0] + 1j * x[1])),
-        (trial, trial),
-        repair="u and v are through the water: take [estimate] of positions and heading in their place",
-        **how | {"equals": (*drift, "current", "sensor u bias")},
-    )
-    if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
-        yield Cause(
-            "wind scale",
-            lambda m, x: m.put({"V_w": m.columns["V_w"] * np.exp(-x[0])}),
-            (0.05,), "1", least=0.05, ratio=True,
-            repair="[columns.V_w]\nfactor = {over0}  # times what is there",
-            equals=("coefficient wind",), tells="a reading of the wind at rest",
-        )  # fmt: skip
-        yield Cause(
-            "wind direction",
-            lambda m, x: m.put({"beta_w": m.columns["beta_w"] - x[0]}),
-            (0.1,), "rad", least=0.05,
-            repair="[columns.beta_w]\noffset = {minus0}  # rad, added to what is there",
-        )  # fmt: skip
-
-
-def _in_current(motion: Motion, current: Array) -> Motion:
+def _add_current(run: NDArray[np.intp], motion: Motion, size: Array) -> Motion:
+    """The log in the currents, north and then east of each [m/s], of which a step (N,) has number `run`."""
+    current = (size[: len(size) // 2] + 1j * size[len(size) // 2 :])[run]
     return motion.put({"V_c": np.abs(current), "beta_c": np.angle(current)})
 
 
-def _over_ground(columns: Mapping[str, Array], current: complex) -> dict[str, Array]:
-    """Velocities over ground, and the current, of a log whose velocities are through the water."""
-    body = current * np.exp(-1j * columns["psi"])
-    calm = np.zeros(len(body))
-    return {
-        "u": columns["u"] + body.real, "v": columns["v"] + body.imag,
-        "V_c": calm + abs(current), "beta_c": calm + float(np.angle(current)),
+def _add_drift(motion: Motion, size: Array) -> Motion:
+    """Velocities over ground in a current (north, east) [m/s], where they are logged through the water."""
+    body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
+    over = {"u": motion.columns["u"] + body.real, "v": motion.columns["v"] + body.imag}
+    return _add_current(np.zeros(len(body), dtype=np.intp), motion.put(over), size)
+
+
+def _scale_numbers(where: NDArray[np.bool_], motion: Motion, size: Array) -> Motion:
+    return replace(motion, parameters=np.where(where, motion.parameters * np.exp(size[0]), motion.parameters))
+
+
+def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]:
+    size, angle, key = float(np.sqrt(np.mean(values**2))), is_steering(name), f"command {name}"
+    column, unit = f'[columns."{name}"]\n', "rad" if angle else "rev/s" if is_shaft(name) else ""
+    strength = ("coefficient rudder",) if angle else (f"{key} zero", "coefficient thrust", "coefficient damping")
+    yield Cause(
+        f"{key} zero", partial(_subtract, name), (0.05 * size,), unit, 0.003 if angle else 0.01 * size,
+        repair=f"{column}offset = {{minus0}}  # {unit}, added to what is there",
+        equals=("asymmetry of hull or screw",) if angle else (f"{key} scale", *strength[1:]),
+        tells="the angle read on a slip, and a run at another speed" if angle else SPEEDS,
+    )  # fmt: skip
+    yield Cause(
+        f"{key} scale", partial(_divide, [name]), (0.05,), "1", 0.02, ratio=True,
+        repair=f"{column}factor = {{over0}}  # times what is there", equals=strength, tells=BESIDE,
+    )  # fmt: skip
+    yield Cause(
+        f"{key} sign", partial(_negate, name), repair=f"{column}sign = -1  # times what is there",
+        equals=("mirror image of the motion",) if angle else (), tells="one turn whose side is known",
+    )  # fmt: skip
+    yield Cause(
+        f"{key} delay", partial(_advance, [name]), (max(0.05 * scales.passing, 0.25 * scales.interval),), "s",
+        max(1.01 * scales.interval, 0.03 * scales.passing), starts=tuple(scales.passing * share for share in LATE),
+        repair=f"{column}# move this column {{0}} s earlier", equals=("slower actuator", "sensors early"),
+        tells="a step of the command at rest, seen at the thruster",
+    )  # fmt: skip
+    if is_shaft(name) and (values < 0).any() and (values > 0).any():
+        yield Cause(
+            f"{key} scale astern", partial(_divide_astern, name), (0.05,), "1", 0.05, ratio=True,
+            repair=f"{column}# times {{over0}} where it is below 0",
+            equals=("coefficient thrust astern",), tells=BESIDE,
+        )  # fmt: skip
+
+
+def _exchanged_thrusters(commands: Sequence[str], motion: Motion) -> Iterator[Cause]:
+    signals: dict[str, list[str]] = {}
+    for name in commands:
+        signals.setdefault(name.rpartition(".")[0], []).append(signal_of(name))
+    for a, b in combinations(signals, 2):
+        pairs = [(f"{a}.{one}", f"{b}.{one}") for one in signals[a]]
+        if signals[a] == signals[b] and any((motion.columns[x] != motion.columns[y]).any() for x, y in pairs):
+            yield Cause(
+                f"exchange {a} {b}", partial(_exchange, pairs), repair=f"exchange the columns of {a} and {b}",
+                equals=("command sign of both",), tells="a run with one of the two alone",
+            )  # fmt: skip
+
+
+def _sensor_causes(scales: Scales) -> Iterator[Cause]:
+    size = {"u": scales.speed, "v": scales.speed, "r": 1 / scales.passing, "psi": 1.0}
+    unit = {"u": "m/s", "v": "m/s", "r": "rad/s", "psi": "rad"}
+    of_log, drift = ("sensor u scale", "sensor velocity scale", "sensor u bias"), ("velocity through water",)
+    bias = {"u": of_log + drift, "v": ("sensor psi bias", *drift), "r": ()}
+    bias["psi"] = ("positions in turned axes", "sensor v bias", "current", *drift)
+    for name, equals in bias.items():
+        yield Cause(
+            f"sensor {name} bias", partial(_subtract, name), (0.02 * size[name],), unit[name], 0.003 * size[name],
+            repair=f"[columns.{name}]\noffset = {{minus0}}  # {unit[name]}, added to what is there",
+            equals=equals, tells=f"{COURSES} and at several speeds",
+        )  # fmt: skip
+    yield Cause(
+        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.003,
+        repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
+        equals=("sensor v bias", "current"), tells=COURSES,
+    )  # fmt: skip
+    scaled: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
+        "u": (("u",), (0, 4)), "v": (("v",), (1,)), "r": (("r",), (2, 3)), "velocity": (VELOCITY, (0, 1, 4, 5))
     }  # fmt: skip
+    for key, (names, rows) in scaled.items():
+        yield Cause(
+            f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.01, ratio=True, scaled=rows,
+            repair=f'[[repair]]\nkind = "scale"\ncolumns = {[*names]}\nfactor = {{over0}}',
+            equals=of_log + drift if "u" in names else (), tells=SPEEDS,
+        )  # fmt: skip
+    for name in ("v", "r", "psi"):
+        words = f"[columns.{name}]\nsign = -1  # times what is there"
+        yield Cause(f"sensor {name} sign", partial(_negate, name), repair=words)
+    of_velocity = ("sensor velocity delay",)
+    late: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
+        "u": (("u",), "velocity", of_velocity),
+        "v": (("v",), "velocity", of_velocity),
+        "r": (("r",), "yaw rate", ()),
+        "psi": (("psi",), "heading", ()),
+        "velocity": (VELOCITY, "velocity", ("sensor u delay", "sensor v delay")),
+        "position": (POSITION, "position", ("lever arm position",)),
+    }
+    for key, (names, kind, equals) in late.items():
+        yield Cause(
+            f"sensor {key} delay", partial(_advance, names), (max(0.03 * scales.passing, 0.25 * scales.interval),), "s",
+            0.01 * scales.passing, starts=tuple(share * scales.passing for share in (*EARLY, *LATE)),
+            repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
+            equals=equals, tells="turns to both sides",
+        )  # fmt: skip
+    yield Cause("heading is course", _heading_from_course, repair="name the column of a gyro or a compass as psi")
+    for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
+        yield Cause(
+            f"lever arm {moves}", partial(_move_to_origin, moves), 2 * (0.05 * scales.length,), "m",
+            0.02 * scales.length, repair=f'[[repair]]\nkind = "lever_arm"\nx = {{0}}\ny = {{1}}\nmoves = "{word}"',
+            equals=("sensor position delay",) if moves == "position" else (), tells="turns to both sides",
+        )  # fmt: skip
+
+
+def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
+    trial, least, count = 0.03 * scales.speed, 0.01 * scales.speed, max(motion.runs) + 1
+    run = np.repeat(motion.runs, [part.stop - part.start for part in motion.stretches])
+    drift = ("sensor psi bias", "sensor v bias", "wind that the log lacks")
+    equals = (*drift, "current", "current by run", "velocity through water")
+    yield Cause(
+        "current", partial(_add_current, 0 * run), 2 * (trial,), "m/s", least,
+        repair="--set current=one  # north {0}, east {1} m/s", equals=equals, tells=COURSES,
+    )  # fmt: skip
+    if count > 1:
+        yield Cause(
+            "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
+            repair='--set current="by run"', equals=equals, tells=COURSES,
+        )  # fmt: skip
+    yield Cause(
+        "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),
+        repair="u and v are through the water: take [estimate] in their place", tells=COURSES,
+    )  # fmt: skip
+    if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
+        yield Cause(
+            "wind scale", partial(_divide, ["V_w"]), (0.05,), "1", 0.05, ratio=True, equals=("coefficient wind",),
+            repair="[columns.V_w]\nfactor = {over0}  # times what is there", tells="the wind read at rest",
+        )  # fmt: skip
+        words = "[columns.beta_w]\noffset = {minus0}  # rad, added to what is there"
+        yield Cause("wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05, repair=words)
 
 
 def _coefficient_causes(vessel: Vessel) -> Iterator[Cause]:
-    names = list(vessel.parameters)
-    groups = {
-        "damping": [p for p in names if p.startswith("hull.") and p.rpartition(".")[2] not in GEOMETRY],
-        "mass": [p for p in names if p in ("inertia.m", "inertia.I_z") or p.startswith("added_mass.")],
-        "thrust": [p for p in names if is_thrust(p)],
-        "rudder": [p for p in names if _is_rudder_force(p)],
+    names, shaft = list(vessel.parameters), "command scale of a shaft"
+    groups: dict[str, tuple[list[str], tuple[str, ...]]] = {
+        "damping": (
+            [path for path in names if path.startswith("hull.") and path.rpartition(".")[2] not in GEOMETRY],
+            ("coefficient thrust", "coefficient mass", shaft),
+        ),
+        "mass": (
+            [path for path in names if path in ("inertia.m", "inertia.I_z") or path.startswith("added_mass.")],
+            ("coefficient thrust", "coefficient damping"),
+        ),
+        "thrust": ([*filter(is_thrust, names)], ("coefficient damping", "coefficient mass", shaft)),
+        "rudder": ([*filter(_is_rudder_force, names)], ("command scale of an angle",)),
     }
-    equals = {
-        "damping": ("coefficient thrust", "coefficient mass"),
-        "mass": ("coefficient thrust", "coefficient damping"),
-        "thrust": ("coefficient damping", "coefficient mass"),
-    }
-    for group, paths in groups.items():
-        where = np.isin(names, paths)
-        if not where.any():
-            continue
-        yield Cause(
-            f"coefficient {group}",
-            lambda m, x, where=where: replace(m, parameters=np.where(where, m.parameters * np.exp(x[0]), m.parameters)),
-            (0.05,),
-            "1",
-            least=0.03,
-            ratio=True,
-            repair=f"--parameters {','.join(paths)}  # factor {{0}}",
-            equals=equals.get(group, ()),
-            tells="runs that speed up and slow down" if group in equals else "the command read beside its instrument",
-        )
+    for group, (paths, equals) in groups.items():
+        if paths:
+            yield Cause(
+                f"coefficient {group}", partial(_scale_numbers, np.isin(names, paths)), (0.05,), "1", 0.03, ratio=True,
+                repair=f"--parameters {','.join(paths)}  # factor {{0}}", equals=equals,
+                tells=BESIDE if group == "rudder" else "runs that speed up and slow down",
+            )  # fmt: skip
 
 
 def _is_rudder_force(path: str) -> bool:
+    """Whether a parameter is one in which the force of a rudder is linear: a slope, or a derivative by its angle."""
     name = path.rpartition(".")[2]
-    return path.startswith("thruster.") and ".actuator." not in path and (name in RUDDER_NUMBERS or "delta" in name)
+    return path.startswith("thruster.") and ".actuator." not in path and (name == "f_alpha" or "delta" in name)

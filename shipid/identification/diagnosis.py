@@ -41,7 +41,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -50,8 +51,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
 from shipid.data.checks import white_noise_of
+from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
@@ -61,14 +62,16 @@ from shipid.simulation.log import body_velocities, state_column
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
+Steps = NDArray[np.integer[Any]]
 NONE, UNCLEAR = "none", "cannot tell"
 LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
 MOST_BUMPS = 400  # of a log: of a longer one parts are taken, evenly
-SMOOTH = POINTS / 24  # steps: standard deviation of the smoothing before the forces
+SMOOTH, NOISY = POINTS / 24, 0.03  # steps, of the smoothing before the forces; noise over signal from which it grows
 EXACT = 0.01  # of the size of the terms: what no resampled log says better
 AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
+MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
@@ -156,24 +159,26 @@ class _Log:
             raise DataError(
                 f"no stretch is longer than {self.width:.3g} s, in which the ship runs {LENGTHS:g} lengths", path="runs"
             )
-        names = parts[0].keys() & set.intersection(*(set(part) for part in parts))
+        shared = set.intersection(*(set(part) for part in parts))
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
         zero = np.zeros(int(ends[-1]))
         columns |= {name: zero for name in self.model.environment if name not in columns}
-        slices = tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         return Motion(columns, np.array(list(self.vessel.parameters.values())), slices, tuple(places), self.step)
 
     def _cut(self, duration: float) -> None:
         """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
-        begins, blocks, folds = [], [], []
+        begins, blocks, folds = list[Steps](), list[Steps](), list[Steps]()
+        first = 0
         several = len(set(self.motion.runs)) >= FOLDS
         every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
         for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
             here = np.arange(part.start, part.stop - POINTS - 1, every)
             number = np.arange(len(here)) // BLOCK
             begins.append(here)
-            blocks.append(number + (max(map(max, filter(len, blocks)), default=-1) + 1))
+            blocks.append(number + first)
+            first += int(number.max(initial=-1)) + 1
             folds.append(np.full(len(here), run % FOLDS) if several else number % FOLDS)
         begin = np.concatenate(begins)
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
@@ -190,8 +195,8 @@ class _Log:
         self.worth = len(begin) * STRIDE / POINTS if every == STRIDE else float(len(begin))
         psi = self.motion.columns["psi"][self.bumps[:, POINTS // 2]]
         self.turn = np.exp(-1j * psi)
-        used = np.unique(self.bumps)
-        self.used, self.place = used, np.searchsorted(used, self.bumps)
+        self.used: Steps = np.unique(self.bumps)
+        self.place = np.searchsorted(self.used, self.bumps)
 
     def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
         """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
@@ -199,18 +204,22 @@ class _Log:
 
         def white(name: str) -> float:
             values = [np.unwrap(rows[name]) if name == "psi" else rows[name] for _, rows in stretches]
-            return share * float(np.median([white_noise_of(np.asarray(one, dtype=float)) for one in values]))
+            return float(share * np.median([white_noise_of(np.asarray(one, dtype=float)) for one in values]))
 
+        sizes = {name: float(np.sqrt(np.mean(self.motion.columns[name] ** 2))) for name in ("u", "v", "r")}
+        rough = max(white(name) / max(size, 1e-12) for name, size in sizes.items())
+        self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
         pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
         speed, passing = self.scales.speed, self.scales.passing
-        sizes = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
+        terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
         velocity = [pulled * white(name) for name in ("u", "v", "r")]
         place = pulled * max(white("north"), white("east"))
         heading = summed * speed * white("psi")
         self.blur = float(np.hypot(max(white("north"), white("east")), 0.1 * EXACT * self.scales.length))
-        noise = [*velocity, np.hypot(pulled * white("psi"), summed * white("r")),
-                 np.hypot(place, summed * white("u")), np.hypot(np.hypot(place, heading), summed * white("v"))]  # fmt: skip
-        return np.hypot(noise, EXACT * 0.1 * sizes)
+        turning = np.hypot(pulled * white("psi"), summed * white("r"))
+        along, across = (np.hypot(place, summed * white(name)) for name in ("u", "v"))
+        noise = [*velocity, turning, along, np.hypot(across, heading)]
+        return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
 
     def memory(self, motion: Motion) -> Array:
         """Actuator states (M, N) that the orders of a log reach."""
@@ -230,7 +239,7 @@ class _Log:
         for name in ("u", "v", "r", "psi"):
             values = np.array(columns[name])
             for part in motion.stretches:
-                values[part] = gaussian_filter1d(columns[name][part], SMOOTH, mode="nearest")
+                values[part] = gaussian_filter1d(columns[name][part], self.smooth, mode="nearest")
             columns[name] = values
         return columns | dict(body_velocities(columns))
 
@@ -243,7 +252,7 @@ class _Log:
             return self._kept[1]
         return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
 
-    def accelerations(self, motion: Motion, at: NDArray[np.intp]) -> Array:
+    def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
         columns = self.states(motion)
         inputs = [self._start(columns, at), self.memory(motion)[:, at]]
@@ -253,7 +262,7 @@ class _Log:
         ]
         return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
 
-    def _start(self, columns: Mapping[str, Array], at: NDArray[np.intp]) -> Array:
+    def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
         """States (., n) at n steps; those that no column has are 0."""
         names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
         return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
@@ -304,6 +313,7 @@ class _Log:
         for _ in range(ROUNDS if len(theta) else 0):
             J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
             step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
+            step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta) if cause.ratio else step
             before = self.misfit(z)
             for _ in range(HALVINGS):
                 after, moved = change(theta + step)
@@ -336,10 +346,10 @@ class _Log:
         weight = self._weights(z)[:, None]
         A, e = J * weight, z * weight
         bread = np.linalg.pinv(np.einsum("icw,jcw->ij", A, A), rcond=1e-12)
-        each = np.einsum("icw,cw->iw", A, e)
-        score = np.zeros((len(J), int(self.block.max()) + 1))
-        np.add.at(score, (slice(None), self.block), each)
-        return np.asarray(bread @ (score @ score.T) @ bread)
+        of_block = self.block[:, None] == np.arange(int(self.block.max()) + 1)
+        score = bread @ np.einsum("icw,cw->iw", A, e) @ of_block
+        covariance: Array = score @ score.T
+        return covariance
 
     def misfit(self, z: Array) -> float:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
@@ -350,11 +360,9 @@ class _Log:
 
         worse, better : residuals (6, W), errors of paths (K,).
         """
-        sums = np.zeros(int(self.block.max()) + 1)
-        for a, b, block, weight in (
-            (*(z[0] ** 2 + self.noise[:, None] ** 2 for z in (worse, better)), self.block, self.worth / 2),
-            (*(z[1][None] ** 2 + self.blur**2 for z in (worse, better)), self.path_block, self.worth),
-        ):
+        sums, floors = np.zeros(int(self.block.max()) + 1), (self.noise[:, None], self.blur)
+        for i, (block, weight) in enumerate(((self.block, self.worth / 2), (self.path_block, self.worth))):
+            a, b = (np.atleast_2d(z[i] ** 2 + floors[i] ** 2) for z in (worse, better))
             ratio = a.mean(axis=1) / b.mean(axis=1)
             level = b.mean(axis=1) * np.where(np.abs(ratio - 1) > 1e-6, (ratio - 1) / np.log(ratio), 1.0)
             each = ((a - b) / level[:, None]).sum(axis=0) * weight / a.shape[1]
@@ -407,6 +415,10 @@ def _likeliest_signs(astern: Array) -> Array:
     return signs
 
 
+def _put_signs(name: str, signs: Array, motion: Motion, _: Array) -> Motion:
+    return motion.put({name: signs * motion.columns[name]})
+
+
 def _unsigned_shafts(log: _Log) -> Iterator[Cause]:
     """Shafts whose speed may lack its sign: astern where u and r change as they do under a shaft that turns astern.
 
@@ -432,7 +444,7 @@ def _unsigned_shafts(log: _Log) -> Iterator[Cause]:
         if (signs < 0).any():
             yield Cause(
                 f"command {name} unsigned",
-                lambda m, _, name=name, signs=signs: m.put({name: signs * m.columns[name]}),
+                partial(_put_signs, name, signs),
                 repair=f'[columns."{name}"]  # has no sign: give the column that says ahead or astern',
                 cost=float((np.diff(signs) != 0).sum()),
             )
