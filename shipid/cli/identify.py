@@ -133,7 +133,7 @@ def identify_command(
             check_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ()
             )
-        _look_first(ship, log, runs or (), test or (), answer)
+        _diagnose_first(ship, log, runs or (), test or (), answer)
         if structures is not None:
             _compare_structures(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
@@ -222,21 +222,20 @@ def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     )
 
 
-def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
-    """Say before anything is fitted whether the vessel predicts the log better than constant u, v, r."""
+def _diagnose_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
+    """Say before anything is fitted what is wrong with the vessel as it is and the log."""
+    from shipid.identification.diagnosis import NONE, diagnose
     from shipid.identification.outcome import pick_runs, without_shared
-    from shipid.study.new import proposed_horizon
-    from shipid.study.survey import first_look, survey_dataset
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     with suppress(DataError), show_steps("comparing the vessel as it is with the runs, before the fit"):
-        ahead, step, _ = proposed_horizon(ship, survey_dataset(log))  # where it cannot, the fit says what is missing
-        look = first_look(ship, log, fitted, ahead=ahead, step=step)
-        if look.wrong:
-            typer.echo(f"warning: {look.sentence}", err=True)
+        found = diagnose(ship, log, fitted)  # where it cannot, the fit says what is missing
+        sentence = f"{ship.name} as it is: {found.sentence}"
+        if found.cause != NONE:
+            typer.echo(f"warning: {sentence}", err=True)
         else:
-            answer.say(look.sentence)
-        answer.say(first_look=look.sentence)
+            answer.say(sentence)
+        answer.say(diagnosis=sentence, cause=found.cause)
 
 
 def _show_identified(outcome: Identification, answer: Answer) -> None:

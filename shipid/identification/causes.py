@@ -96,7 +96,7 @@ class Cause:
         return text
 
 
-def list_causes(vessel: Vessel, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
+def list_causes(vessel: Vessel | None, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
     """All causes that a vessel and a log can have."""
     moving = [name for name in commands if np.ptp(motion.columns[name]) > 0]
     return [
@@ -104,7 +104,7 @@ def list_causes(vessel: Vessel, commands: Sequence[str], motion: Motion, scales:
         *_exchanged_thrusters(commands, motion),
         *_sensor_causes(scales),
         *_water_causes(motion, scales),
-        *_coefficient_causes(vessel),
+        *(() if vessel is None else _coefficient_causes(vessel)),
     ]
 
 

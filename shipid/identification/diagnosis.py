@@ -59,12 +59,14 @@ from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes
 from shipid.physics.signals import is_command, is_shaft, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
+from shipid.units import percent_text
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Steps = NDArray[np.integer[Any]]
 NONE, UNCLEAR = "none", "cannot tell"
 LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
+MOST_PASSING = 200  # rows in which a ship of unknown length runs it, at most
 MOST_BUMPS = 400  # of a log: of a longer one parts are taken, evenly
 SMOOTH, NOISY = POINTS / 24, 0.03  # steps, of the smoothing before the forces; noise over signal from which it grows
 EXACT = 0.01  # of the size of the terms: what no resampled log says better
@@ -72,6 +74,7 @@ AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
+MOST_SIZES = 2  # that a sentence names
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
@@ -86,7 +89,7 @@ class Diagnosis:
     cause : key, `none` or `cannot tell`. equals : keys that the log does not tell from it.
     size : of the cause in SI units, an empty tuple where it has none (a sign). interval : 95 %, (low, high) of each.
     repair : lines for the mapping of the log, the vessel or the settings of an identification.
-    sentence : all of it in words. share : of the error of the predicted path that it explains.
+    sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s] that it explains.
     next : the same of a second cause beside the first, if there is one.
     misfits : key -> misfit on parts left out, less that of `none`.
     """
@@ -98,6 +101,8 @@ class Diagnosis:
     repair: str = ""
     sentence: str = ""
     share: float = 0.0
+    error: float = 0.0
+    ahead: float = 0.0
     next: Diagnosis | None = None
     misfits: Mapping[str, float] | None = None
 
@@ -114,35 +119,52 @@ class _Fit:
 
 
 class _Log:
-    """A log at equal steps with its bumps, and the residuals of any change of it."""
+    """A log at equal steps with its bumps, and the residuals of any change of it by kinematics alone."""
 
-    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
-        if "current" not in vessel.document:
-            vessel = vessel.with_values({"current.kind": "uniform"})
-        self.vessel, self.model = vessel, vessel_dynamics(vessel)
+    length: float | None = None
+    commands: tuple[str, ...] = ()
+    environment: tuple[str, ...] = ()
+    numbers: tuple[float, ...] = ()
+
+    def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
         stretches = [(run, rows) for run, rows in stretch_columns(dataset) if run in runs]
-        missing = next((name for name in self.model.commands if name not in dataset.commands), None)
-        if missing is not None:
-            raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
-        speed = np.concatenate([np.hypot(rows["u"], rows["v"]) for _, rows in stretches])
-        fast = float(np.sqrt(np.mean(speed**2)))
+        speed, rate = (
+            float(np.sqrt(np.mean(np.concatenate([of(rows) ** 2 for _, rows in stretches]))))
+            for of in (lambda rows: np.hypot(rows["u"], rows["v"]), lambda rows: rows["r"])
+        )
         usual = float(np.median(np.concatenate([np.diff(rows["t"]) for _, rows in stretches])))
         longest = max(float(np.ptp(rows["t"])) for _, rows in stretches)
-        rate = float(np.sqrt(np.mean(np.concatenate([rows["r"] for _, rows in stretches]) ** 2)))
-        length = vessel.length or fast / max(rate, 1e-9)
-        self.scales = Scales(length, fast, usual)
+        length = self.length or speed / max(rate, speed / MOST_PASSING / usual)
+        self.scales = Scales(length, max(speed, 1e-6 * length / usual), usual)
         self.width = max(min(LENGTHS * self.scales.passing, longest / 4), 8 * usual)
         self.step = self.width / POINTS
         self.motion = self._resample(runs, stretches)
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
-        self.repair(self.motion)
 
     def repair(self, motion: Motion) -> None:
-        """Take another motion for the log, whose actuators and forces are kept."""
-        self.motion, self._kept = motion, None
-        memory = self.memory(motion)
-        self._kept = memory, np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        """Take another motion for the log."""
+        self.motion = motion
+
+    def causes(self) -> list[Cause]:
+        """What may be wrong with the log."""
+        return [one for one in list_causes(None, (), self.motion, self.scales) if not one.key.startswith("current")]
+
+    def forces(self, motion: Motion) -> Array:
+        """Mean accelerations (3, W) over the bumps, such as they are: no physics says others."""
+        return np.array([motion.columns[name][self.bumps] @ self.pull for name in ("u", "v", "r")])
+
+    def path_errors(self, motion: Motion) -> Array:
+        """Mean error (K,) [m] of each path over 2.5 ship lengths by dead reckoning with u, v, r."""
+        columns, rows = self.states(motion), self.paths + np.arange(AHEAD + 1)[:, None]
+        u, v, r = (columns[name][rows] for name in ("u", "v", "r"))
+
+        def travelled(rate: NDArray[Any]) -> NDArray[Any]:
+            return self.step * np.cumsum((rate[1:] + rate[:-1]) / 2, axis=0)
+
+        heading = columns["psi"][rows[0]] + np.concatenate([0 * r[:1], travelled(r)])
+        place = columns["north"][rows] + 1j * columns["east"][rows]
+        return np.asarray(np.abs(place[1:] - place[0] - travelled((u + 1j * v) * np.exp(1j * heading))).mean(axis=0))
 
     def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
         parts: list[dict[str, Array]] = []
@@ -163,9 +185,9 @@ class _Log:
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
         columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
         zero = np.zeros(int(ends[-1]))
-        columns |= {name: zero for name in self.model.environment if name not in columns}
+        columns |= {name: zero for name in self.environment if name not in columns}
         slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-        return Motion(columns, np.array(list(self.vessel.parameters.values())), slices, tuple(places), self.step)
+        return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
 
     def _cut(self, duration: float) -> None:
         """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
@@ -221,18 +243,6 @@ class _Log:
         noise = [*velocity, turning, along, np.hypot(across, heading)]
         return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
 
-    def memory(self, motion: Motion) -> Array:
-        """Actuator states (M, N) that the orders of a log reach."""
-        orders = {name: motion.columns[name] for name in self.model.commands}
-        if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
-            return self._kept[0]
-        result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
-        for part in motion.stretches if self.model.memory else ():
-            given = {name: values[part] for name, values in orders.items()}
-            reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
-            result[:, part] = np.array([reached[name] for name in self.model.memory])
-        return result
-
     def states(self, motion: Motion) -> dict[str, Array]:
         """Columns of the states, those of motion smoothed."""
         columns = dict(motion.columns)
@@ -242,30 +252,6 @@ class _Log:
                 values[part] = gaussian_filter1d(columns[name][part], self.smooth, mode="nearest")
             columns[name] = values
         return columns | dict(body_velocities(columns))
-
-    def forces(self, motion: Motion) -> Array:
-        """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
-        names = ["u", "v", "r", *self.model.commands, *self.model.environment]
-        names += ["psi"] if any(motion.columns[name].any() for name in self.model.environment) else []
-        same = self._kept is not None and motion.parameters is self.motion.parameters
-        if self._kept is not None and same and all(motion.columns[name] is self.motion.columns[name] for name in names):
-            return self._kept[1]
-        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
-
-    def accelerations(self, motion: Motion, at: Steps) -> Array:
-        """Accelerations (3, n) of u, v, r by the physics at n steps."""
-        columns = self.states(motion)
-        inputs = [self._start(columns, at), self.memory(motion)[:, at]]
-        inputs += [
-            np.array([columns[name][at] for name in names]).reshape(-1, len(at))
-            for names in (self.model.commands, self.model.environment)
-        ]
-        return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
-
-    def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
-        """States (., n) at n steps; those that no column has are 0."""
-        names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
-        return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
 
     def residuals(self, motion: Motion) -> Array:
         """Residuals (6, W): measured change less predicted change, a unit of time."""
@@ -277,24 +263,6 @@ class _Log:
         return np.stack(
             [*(np.array(changes[:3]) - forces), changes[3] - columns["r"][bumps] @ self.phi, path.real, path.imag]
         )
-
-    def path_errors(self, motion: Motion) -> Array:
-        """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
-        columns, at = self.states(motion), self.paths
-        rows = at + np.arange(AHEAD + 1)[:, None]
-        found = rollout_distances(
-            self.vessel,
-            dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
-            {name: columns[name][rows[:-1]] for name in self.model.commands},
-            {name: columns[name][rows[:-1]] for name in self.model.environment},
-            np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1),
-            step=self.step,
-            method="rk4",
-            parameters=motion.parameters[None],
-            memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
-        )
-        far = LOST * self.scales.length
-        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / AHEAD, far)))
 
     def estimate(self, cause: Cause) -> _Fit:
         """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
@@ -370,6 +338,86 @@ class _Log:
         return float(sums.sum()), float(np.std(sums) * np.sqrt(len(sums))) + 1e-9
 
 
+class _VesselLog(_Log):
+    """A log with the vessel that should have made it."""
+
+    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
+        if "current" not in vessel.document:
+            vessel = vessel.with_values({"current.kind": "uniform"})
+        self.vessel, self.model = vessel, vessel_dynamics(vessel)
+        self.length, self.commands, self.environment = vessel.length, self.model.commands, self.model.environment
+        self.numbers = tuple(vessel.parameters.values())
+        missing = next((name for name in self.commands if name not in dataset.commands), None)
+        if missing is not None:
+            raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
+        super().__init__(dataset, runs)
+        self.repair(self.motion)
+
+    def repair(self, motion: Motion) -> None:
+        """Take another motion for the log, whose actuators and forces are kept."""
+        self.motion, self._kept = motion, None
+        memory = self.memory(motion)
+        self._kept = memory, np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+
+    def causes(self) -> list[Cause]:
+        """What may be wrong with the log or with the vessel."""
+        return [*list_causes(self.vessel, self.commands, self.motion, self.scales), *_unsigned_shafts(self)]
+
+    def memory(self, motion: Motion) -> Array:
+        """Actuator states (M, N) that the orders of a log reach."""
+        orders = {name: motion.columns[name] for name in self.commands}
+        if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
+            return self._kept[0]
+        result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
+        for part in motion.stretches if self.model.memory else ():
+            given = {name: values[part] for name, values in orders.items()}
+            reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
+            result[:, part] = np.array([reached[name] for name in self.model.memory])
+        return result
+
+    def forces(self, motion: Motion) -> Array:
+        """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
+        names = ["u", "v", "r", *self.commands, *self.environment]
+        names += ["psi"] if any(motion.columns[name].any() for name in self.environment) else []
+        same = self._kept is not None and motion.parameters is self.motion.parameters
+        if self._kept is not None and same and all(motion.columns[name] is self.motion.columns[name] for name in names):
+            return self._kept[1]
+        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+
+    def accelerations(self, motion: Motion, at: Steps) -> Array:
+        """Accelerations (3, n) of u, v, r by the physics at n steps."""
+        columns = self.states(motion)
+        inputs = [self._start(columns, at), self.memory(motion)[:, at]]
+        inputs += [
+            np.array([columns[name][at] for name in names]).reshape(-1, len(at))
+            for names in (self.commands, self.environment)
+        ]
+        return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
+
+    def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
+        """States (., n) at n steps; those that no column has are 0."""
+        names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
+        return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
+
+    def path_errors(self, motion: Motion) -> Array:
+        """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
+        columns, at = self.states(motion), self.paths
+        rows = at + np.arange(AHEAD + 1)[:, None]
+        found = rollout_distances(
+            self.vessel,
+            dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
+            {name: columns[name][rows[:-1]] for name in self.commands},
+            {name: columns[name][rows[:-1]] for name in self.environment},
+            np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1),
+            step=self.step,
+            method="rk4",
+            parameters=motion.parameters[None],
+            memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
+        )
+        far = LOST * self.scales.length
+        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / AHEAD, far)))
+
+
 def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
     """A column at equal steps: an order holds from its row on; motion is averaged over a step, or goes on smoothly."""
     if is_command(name):
@@ -419,7 +467,7 @@ def _put_signs(name: str, signs: Array, motion: Motion, _: Array) -> Motion:
     return motion.put({name: signs * motion.columns[name]})
 
 
-def _unsigned_shafts(log: _Log) -> Iterator[Cause]:
+def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     """Shafts whose speed may lack its sign: astern where u and r change as they do under a shaft that turns astern.
 
     Pieces in which the sign is the same are found with it.
@@ -430,7 +478,7 @@ def _unsigned_shafts(log: _Log) -> Iterator[Cause]:
         measured[:, part] = [
             np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r")
         ]
-    for name in filter(is_shaft, log.model.commands):
+    for name in filter(is_shaft, log.commands):
         values = motion.columns[name]
         if values.min() < 0 or np.ptp(values) == 0:
             continue
@@ -450,18 +498,21 @@ def _unsigned_shafts(log: _Log) -> Iterator[Cause]:
             )
 
 
-def diagnose(vessel: Vessel, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
-    """Find what is wrong with a vessel and a log of it; runs : names, default: all.
+def diagnose(vessel: Vessel | None, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
+    """Find what is wrong with a vessel and a log of it, or with a log alone; runs : names, default: all.
 
     Raises DataError where a command is missing, or no stretch is long enough.
     """
-    log = _Log(vessel, dataset, list(dataset.runs if runs is None else runs))
-    causes = [*list_causes(log.vessel, log.model.commands, log.motion, log.scales), *_unsigned_shafts(log)]
+    names = list(dataset.runs if runs is None else runs)
+    log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names)
+    causes = log.causes()
     first, cause = _judge(log, causes)
     if cause is None:
         return first
     log.repair(log.estimate(cause).motion)
-    return replace(first, next=_judge(log, [one for one in causes if one.key != cause.key])[0])
+    second = _judge(log, [one for one in causes if one.key != cause.key])[0]
+    both = f"{first.sentence}; without that, {second.sentence}"
+    return replace(first, sentence=both, next=second)
 
 
 def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]:
@@ -478,7 +529,10 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     cause, theta = best.cause, best.theta
     gain, error = log.gain(plain, seen[order[0]])
     share = 1 - float(seen[order[0]][1].mean() / plain[1].mean())
-    result = Diagnosis(NONE, share=share, misfits=misfits)
+    ahead, missed = log.step * AHEAD, float(plain[1].mean())
+    how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average"
+    result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
+    result = replace(result, sentence=f"{how_far}, and no single cause explains that")
     shown = gain > SURE * error and misfits[order[0]] < 0 and share > (WORTH if cause.trial else WORTH_DISCRETE)
     if not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
@@ -486,14 +540,22 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
     name = cause.key.partition(" / ")[0]
     if set(near) - {name, *cause.equals}:
-        return replace(result, cause=UNCLEAR, equals=(name, *(key for key in near if key != name))), None
+        alike = (name, *(key for key in near if key != name))
+        sentence = f"{how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
+        return replace(result, cause=UNCLEAR, equals=alike, sentence=_with_remedy(sentence, cause.tells)), None
     ends = (cause.sizes(theta - 1.96 * best.errors), cause.sizes(theta + 1.96 * best.errors))
     unfitted = [key for key in cause.equals if key not in fits]
+    equals = tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name)
+    interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
+    sizes, repair = cause.sizes(theta), cause.repair_text(theta)
+    words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
+    sentence = f"{name}{' = ' * bool(words)}{', '.join(words)}{' ' * (len(cause.unit) > 1)}{cause.unit.strip('1')}"
+    sentence = f"{how_far}: {sentence} explains {percent_text(share)} of that; {' '.join(repair.split())}"
+    sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
     return replace(
-        result,
-        cause=name,
-        equals=tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name),
-        size=cause.sizes(theta),
-        interval=tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True)),
-        repair=cause.repair_text(theta),
+        result, cause=name, equals=equals, size=sizes, interval=interval, repair=repair, sentence=sentence
     ), cause
+
+
+def _with_remedy(sentence: str, tells: str) -> str:
+    return f"{sentence}: to tell them apart, {tells}" if tells else sentence

@@ -27,7 +27,7 @@ from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.bands import LONG, Measure, band_refusal, check_level, measure_bands
 from shipid.identification.curvature import curvature_warning
-from shipid.identification.diagnosis import diagnose
+from shipid.identification.diagnosis import NONE, diagnose
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs, with_current
 from shipid.identification.plausible import implausibility
@@ -388,7 +388,7 @@ def _diagnosed_log(vessel: Vessel, solution: Solution, dataset: Dataset) -> str:
         return ""
     known = {"current": "current", "lever_arm": "lever arm", "heading_bias": "sensor psi bias", "latency": "delay"}
     words = [word for name, word in known.items() if name in solution.settings.widths]
-    return "" if any(word in found.cause for word in words) else found.sentence
+    return "" if found.cause == NONE or any(word in found.cause for word in words) else found.sentence
 
 
 def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
