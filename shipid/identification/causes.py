@@ -175,6 +175,15 @@ def _add_drift(motion: Motion, size: Array) -> Motion:
     return _add_current(np.zeros(len(body), dtype=np.intp), motion.put(over), size)
 
 
+def _add_drift_along(motion: Motion, size: Array) -> Motion:
+    """Velocities over ground in a current, where a speed through the water was resolved along the course."""
+    through = motion.columns["u"] + 1j * motion.columns["v"]
+    course = through / np.maximum(np.abs(through), 1e-9)
+    body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
+    over = through + course * (body * course.conj()).real
+    return _add_current(np.zeros(len(body), dtype=np.intp), motion.put({"u": over.real, "v": over.imag}), size)
+
+
 def _scale_numbers(where: NDArray[np.bool_], motion: Motion, size: Array) -> Motion:
     return replace(motion, parameters=np.where(where, motion.parameters * np.exp(size[0]), motion.parameters))
 
@@ -270,11 +279,12 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             equals=equals, tells="turns to both sides",
         )  # fmt: skip
     yield Cause("heading is course", _heading_from_course, repair="name the column of a gyro or a compass as psi")
+    arms = {"position": ("lever arm velocity", "sensor position delay"), "velocity": ("lever arm position",)}
     for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
         yield Cause(
             f"lever arm {moves}", partial(_move_to_origin, moves), 2 * (0.05 * scales.length,), "m",
             0.02 * scales.length, repair=f'[[repair]]\nkind = "lever_arm"\nx = {{0}}\ny = {{1}}\nmoves = "{word}"',
-            equals=("sensor position delay",) if moves == "position" else (), tells="turns to both sides",
+            equals=arms.get(moves, ()), tells="turns to both sides, and runs at another speed",
         )  # fmt: skip
 
 
@@ -295,6 +305,10 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     yield Cause(
         "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),
         repair="u and v are through the water: take [estimate] in their place", tells=COURSES,
+    )  # fmt: skip
+    yield Cause(
+        "velocity through water / along the course", _add_drift_along, 2 * (trial,), "m/s", least, equals=equals,
+        repair="the speed is one through the water: take [estimate] in its place", tells=COURSES,
     )  # fmt: skip
     if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
         yield Cause(

@@ -50,6 +50,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
+from scipy.special import exprel
 
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
@@ -74,11 +75,12 @@ AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
+PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics alone are judged
 MOST_SIZES = 2  # that a sentence names
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
-WORTH, WORTH_DISCRETE = 0.25, 0.05  # share of the error of the path; of a cause without a size, as a wrong sign
+WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the path; of a cause without a size, as a wrong sign
 CHANNELS = ("u", "v", "r", "psi", "along", "across")
 
 
@@ -122,6 +124,7 @@ class _Log:
     """A log at equal steps with its bumps, and the residuals of any change of it by kinematics alone."""
 
     length: float | None = None
+    plain = PLAIN
     commands: tuple[str, ...] = ()
     environment: tuple[str, ...] = ()
     numbers: tuple[float, ...] = ()
@@ -331,8 +334,8 @@ class _Log:
         sums, floors = np.zeros(int(self.block.max()) + 1), (self.noise[:, None], self.blur)
         for i, (block, weight) in enumerate(((self.block, self.worth / 2), (self.path_block, self.worth))):
             a, b = (np.atleast_2d(z[i] ** 2 + floors[i] ** 2) for z in (worse, better))
-            ratio = a.mean(axis=1) / b.mean(axis=1)
-            level = b.mean(axis=1) * np.where(np.abs(ratio - 1) > 1e-6, (ratio - 1) / np.log(ratio), 1.0)
+            off = np.log(a.mean(axis=1) / b.mean(axis=1))
+            level = b.mean(axis=1) * exprel(off)  # the logarithmic mean of both
             each = ((a - b) / level[:, None]).sum(axis=0) * weight / a.shape[1]
             sums += np.bincount(block, each, len(sums))
         return float(sums.sum()), float(np.std(sums) * np.sqrt(len(sums))) + 1e-9
@@ -340,6 +343,8 @@ class _Log:
 
 class _VesselLog(_Log):
     """A log with the vessel that should have made it."""
+
+    plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
     def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
         if "current" not in vessel.document:
@@ -528,12 +533,16 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     best = fits[order[0]]
     cause, theta = best.cause, best.theta
     gain, error = log.gain(plain, seen[order[0]])
-    share = 1 - float(seen[order[0]][1].mean() / plain[1].mean())
+    share = 1 - float(seen[order[0]][1].mean() / max(plain[1].mean(), log.blur))
     ahead, missed = log.step * AHEAD, float(plain[1].mean())
     how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average"
     result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{how_far}, and no single cause explains that")
-    shown = gain > SURE * error and misfits[order[0]] < 0 and share > (WORTH if cause.trial else WORTH_DISCRETE)
+    shown = (
+        gain > SURE * error
+        and misfits[order[0]] < 0
+        and (share > (WORTH if cause.trial else WORTH_DISCRETE) or gain > log.plain * log.worth)
+    )
     if not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
     tied = [key for key in order[1:] if (pair := log.gain(seen[key], seen[order[0]]))[0] < APART * pair[1]]
