@@ -77,6 +77,7 @@ ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
 PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics alone are judged
 MOST_SIZES = 2  # that a sentence names
+HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
@@ -263,9 +264,9 @@ class _Log:
         changes = [columns[name][bumps] @ self.pull for name in ("u", "v", "r", "psi", "north", "east")]
         velocity = (columns["u"] + 1j * columns["v"]) * np.exp(1j * columns["psi"])
         path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
-        return np.stack(
-            [*(np.array(changes[:3]) - forces), changes[3] - columns["r"][bumps] @ self.phi, path.real, path.imag]
-        )
+        turning = changes[3] - columns["r"][bumps] @ self.phi
+        every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
+        return np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE)
 
     def estimate(self, cause: Cause) -> _Fit:
         """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
@@ -300,7 +301,8 @@ class _Log:
         for fold in range(FOLDS) if len(theta) else ():
             out = self.fold == fold
             if out.any() and not out.all():
-                left[:, out] += np.tensordot(self._step(J, z, ~out), J[:, :, out], 1)
+                step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
+                left[:, out] += np.tensordot(step, J[:, :, out], 1)
         return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
 
     def _weights(self, z: Array) -> Array:
