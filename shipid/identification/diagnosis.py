@@ -15,11 +15,13 @@ the water or of the numbers of the vessel; it is fitted alone by Gauss-Newton fr
 **Classes of equals**, which no or hardly any log tells apart (each with the run that would):
 
 - zero of an angle that steers, and an asymmetry of hull or screw;
-- scale of a command, and the coefficient of its thrust (`thrust`, `rudder`), and of a shaft the damping ahead;
+- scale of an angle, and the coefficient of the rudder; scale and zero of a shaft, and the coefficients of its thrust
+  and of the damping ahead, at few speeds;
 - delay of a command, a slower actuator, and all sensors early;
 - bias of psi, positions in turned axes, and on one course a current, velocity through water or bias of v;
 - bias and scale of u at one speed, velocity through water on one course, and scale of the velocity;
-- lever arm of the position ahead, and its delay, at one speed and without turns;
+- lever arm of the position ahead, and its delay, at one speed and without turns; without a vessel also that of the
+  velocity;
 - exchanged thrusters, and the sign of each where they are used against each other;
 - coefficient of mass, and of thrust and damping together; coefficients of thrust and damping at steady speed.
 
@@ -28,13 +30,15 @@ that do not overlap: it is free of scale, and an equation in which the vessel is
 white noise that the log itself shows, as it passes the bump, and `EXACT` of the size of the terms. A cause is
 estimated without a part of the runs (or of the time, where there is one run) and its misfit is taken on that part.
 
-- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or the one that lowers it
-  most lowers the error of the predicted path by less than a share `WORTH`, or is smaller than what a log has anyhow (a
-  command that is a row late).
-- The cause of least misfit is named where it is better than each other one, its equals apart, by `APART` standard
-  errors; those of its class that are not are `equals`. Else the answer is `cannot tell`, and `equals` are the causes
-  that remain.
-- The next cause is looked for in the same way beside the first.
+The causes of least misfit also predict paths of 2.5 ship lengths, whose errors count as a seventh equation.
+
+- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or the
+  one that does lowers the error of the paths by less than a share `WORTH`, or is smaller than what a log has anyhow
+  (a command that is a row late).
+- The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
+  the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
+  and `equals` are the causes that remain.
+- A second cause is looked for in the same way once the log is repaired from the first.
 """
 
 from __future__ import annotations
@@ -81,6 +85,7 @@ HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
+DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
 WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the path; of a cause without a size, as a wrong sign
 CHANNELS = ("u", "v", "r", "psi", "along", "across")
 
@@ -305,18 +310,19 @@ class _Log:
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
         return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
 
-    def _weights(self, z: Array) -> Array:
+    def weights(self, z: Array) -> Array:
+        """Inverse of the level (6,) of residuals."""
         return np.asarray(1 / np.sqrt((z**2).mean(axis=1) + self.noise**2))
 
     def _step(self, J: Array, z: Array, kept: NDArray[np.bool_]) -> Array:
-        weight = self._weights(z[:, kept])[:, None]
+        weight = self.weights(z[:, kept])[:, None]
         A = (J[:, :, kept] * weight).reshape(len(J), -1).T
         size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
         return np.asarray(-np.linalg.lstsq(A / size, (z[:, kept] * weight).ravel(), rcond=1e-6)[0] / size)
 
     def _covariance(self, J: Array, z: Array) -> Array:
         """Covariance (k, k) by blocks of bumps (sandwich)."""
-        weight = self._weights(z)[:, None]
+        weight = self.weights(z)[:, None]
         A, e = J * weight, z * weight
         bread = np.linalg.pinv(np.einsum("icw,jcw->ij", A, A), rcond=1e-12)
         of_block = self.block[:, None] == np.arange(int(self.block.max()) + 1)
@@ -470,37 +476,38 @@ def _likeliest_signs(astern: Array) -> Array:
     return signs
 
 
-def _put_signs(name: str, signs: Array, motion: Motion, _: Array) -> Motion:
-    return motion.put({name: signs * motion.columns[name]})
+def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
+    return motion.put({name: signs * motion.columns[name] for name in names})
 
 
 def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
-    """Shafts whose speed may lack its sign: astern where u and r change as they do under a shaft that turns astern.
+    """Shafts whose speed may lack its sign, each alone and all together.
 
-    Pieces in which the sign is the same are found with it.
+    They turn astern where u and r change as they do under shafts that turn astern.
     """
     motion, every = log.motion, np.arange(len(log.motion.columns["u"]))
     smooth, measured = log.states(motion), np.zeros((2, len(every)))
     for part in motion.stretches:
-        measured[:, part] = [
-            np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r")
-        ]
-    for name in filter(is_shaft, log.commands):
-        values = motion.columns[name]
-        if values.min() < 0 or np.ptp(values) == 0:
-            continue
+        rates = (np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r"))
+        measured[:, part] = list(rates)
+    shafts = [name for name in filter(is_shaft, log.commands) if motion.columns[name].min() >= 0]
+    shafts = [name for name in shafts if np.ptp(motion.columns[name]) > 0]
+    for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
         ahead, astern = (
-            (measured - log.accelerations(motion.put({name: sign * values}), every)[[0, 2]]) ** 2 for sign in (1, -1)
+            (measured - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2 for sign in (1, -1)
         )
         signs = np.ones(len(every))
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
-            level = 1 / log._weights(log.residuals(motion.put({name: signs * values})))[[0, 2], None]
+            level = 1 / log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2], None]
             signs = _likeliest_signs(((ahead - astern) / level**2).sum(axis=0) / POINTS)
         if (signs < 0).any():
+            together = f" / with {' '.join(names[1:])}" * (len(names) > 1)
             yield Cause(
-                f"command {name} unsigned",
-                partial(_put_signs, name, signs),
-                repair=f'[columns."{name}"]  # has no sign: give the column that says ahead or astern',
+                f"command {names[0]} unsigned{together}",
+                partial(_put_signs, names, signs),
+                repair=f"{' and '.join(names)} without a sign: give the column that says ahead or astern",
+                equals=tuple(f"command {name} unsigned" for name in shafts),
+                tells="the column that says ahead or astern",
                 cost=float((np.diff(signs) != 0).sum()),
             )
 
@@ -541,13 +548,14 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{how_far}, and no single cause explains that")
     shown = (
-        gain > SURE * error
+        gain > min(SURE * error, DECISIVE)
         and misfits[order[0]] < 0
         and (share > (WORTH if cause.trial else WORTH_DISCRETE) or gain > log.plain * log.worth)
     )
     if not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
-    tied = [key for key in order[1:] if (pair := log.gain(seen[key], seen[order[0]]))[0] < APART * pair[1]]
+    behind = {key: log.gain(seen[key], seen[order[0]]) for key in order[1:]}
+    tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
     near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
     name = cause.key.partition(" / ")[0]
     if set(near) - {name, *cause.equals}:

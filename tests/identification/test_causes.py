@@ -1,4 +1,4 @@
-"""Laws of causes: a size of nothing changes nothing, what has no size is undone by itself, a repair holds its numbers."""
+"""Laws of causes: no size changes nothing, what has no size is undone by itself, a repair holds its numbers."""
 
 from __future__ import annotations
 

@@ -85,8 +85,8 @@ def test_coefficients_are_named_as_a_class() -> None:
 def test_a_shaft_without_its_sign_is_named() -> None:
     craft = load_vessel("otter")
     random, log = np.random.default_rng(3), trials(craft, runs=4, steps=200, seed=3, step=0.25)
-    orders = np.repeat(random.uniform(-8, 12, (4, 21)), 10, axis=1)[:, :201].T
-    signed = trials(craft, runs=4, steps=200, seed=3, step=0.25, true_commands={name: orders for name in log.commands})
+    orders = np.repeat(random.uniform(-8, 12, (4, 6)), 40, axis=1)[:, :201].T
+    signed = trials(craft, runs=4, steps=200, seed=3, step=0.25, true_commands=dict.fromkeys(log.commands, orders))
     spoilt = changed(signed, **{name: np.abs(orders).T.ravel() for name in log.commands})
     found = diagnose(craft, spoilt)
     assert found.cause in ("command port.n unsigned", "command starboard.n unsigned")

@@ -220,8 +220,8 @@ def test_a_vessel_that_is_stiff_in_yaw_takes_smaller_steps(tmp_path: Path) -> No
     file = tmp_path / "stiff.toml"
     file.write_text(patch, encoding="utf-8")
     draft, document = drafted(tmp_path, trial(), str(file))
-    (view,) = draft.looks.values()
-    assert np.isfinite(view.vessel_error)
+    (found,) = draft.diagnoses.values()
+    assert np.isfinite(found.error)
     assert document["prediction"]["step"] == drafted(tmp_path, trial())[1]["prediction"]["step"] / 4
     assert "4 times as long diverges" in draft.text
 
