@@ -273,7 +273,7 @@ class _Log:
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
         return np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE)
 
-    def estimate(self, cause: Cause) -> _Fit:
+    def estimate(self, cause: Cause, rounds: int = ROUNDS) -> _Fit:
         """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
         trials = np.array(cause.trial)
 
@@ -287,7 +287,7 @@ class _Log:
         begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
         theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
         J = np.zeros((len(theta), *z.shape))
-        for _ in range(ROUNDS if len(theta) else 0):
+        for _ in range(rounds if len(theta) else 0):
             J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
             step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
             step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta) if cause.ratio else step
@@ -531,8 +531,10 @@ def diagnose(vessel: Vessel | None, dataset: Dataset, runs: Sequence[str] | None
 
 def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]:
     """The best of all causes as a diagnosis, and the cause where it is named."""
-    fits = {cause.key: log.estimate(cause) for cause in causes}
     base = log.residuals(log.motion)
+    first = {cause.key: log.estimate(cause, 1) for cause in causes}
+    near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
+    fits = first | {key: log.estimate(first[key].cause) for key in near}
     misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)

@@ -143,11 +143,11 @@ def test_positions_that_scatter_are_not_the_true_path(sigma: float, adds_up: boo
 
 
 def test_a_log_that_fails_its_checks_is_named_before_the_vessel(tmp_path: Path) -> None:
-    """Knots taken for m/s: positions say half the way. And 99 kn in one row: physics diverges there."""
+    """Knots taken for m/s are named with their factor. And 99 kn in one row: physics diverges there."""
     draft, document = drafted(tmp_path, trial(u=3600 / 1852))
     assert document["data"]["path"] == "position"
-    assert "fails: path (8 runs)" in draft.warnings[0]
-    assert "# NOTE `shipid data check" in draft.text
+    assert "sensor velocity scale = 1.94" in draft.warnings[-1]
+    assert "factor = 0.5144" in draft.warnings[-1]
     dataset = trial()
     spoilt = dataset.frame["u"].where(dataset.frame["t"] != dataset.frame["t"].iloc[40], 51.0)
     with pytest.raises(DocumentError, match=r"diverges on .* but first: `shipid data check .*u reaches 51 m/s"):
