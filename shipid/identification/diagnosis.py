@@ -86,7 +86,8 @@ FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of er
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
 DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
-WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the path; of a cause without a size, as a wrong sign
+WORTH = {"sensor": 0.2, "command": 0.25, "coefficient": 0.3}  # share of the error of the path; a poor vessel has some
+WORTH_OTHER, WORTH_DISCRETE = 0.2, 0.05  # of another cause; of one without a size, as a wrong sign
 CHANNELS = ("u", "v", "r", "psi", "along", "across")
 
 
@@ -181,7 +182,7 @@ class _Log:
         for run, rows in stretches:
             t = np.asarray(rows["t"], dtype=float)
             count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
-            if count > POINTS + 1 and len(t) > 8:
+            if count > AHEAD and len(t) > 8:
                 grid = t[0] + self.step * np.arange(count)
                 names = [name for name in rows if name not in ("run", "t", "flags")]
                 parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
@@ -549,10 +550,9 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average"
     result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{how_far}, and no single cause explains that")
+    least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
     shown = (
-        gain > min(SURE * error, DECISIVE)
-        and misfits[order[0]] < 0
-        and (share > (WORTH if cause.trial else WORTH_DISCRETE) or gain > log.plain * log.worth)
+        gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
     )
     if not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
