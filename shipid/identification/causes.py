@@ -19,6 +19,8 @@ from shipid.vessel.schema import SHARED
 VELOCITY, POSITION = ("u", "v"), ("north", "east")
 GEOMETRY = frozenset((*SHARED, "x_aft", "x_fwd", "L_pp", "T", "rho", "nabla"))
 LATE, EARLY = (0.3, 1.0, 2.0, 4.0), (-1.0, -0.3)  # delays from which a fit may begin, in times of a ship length
+UNITS = tuple(sign * float(np.log(unit)) for unit in (1852 / 3600, np.pi / 180, 1 / 60) for sign in (1, -1))
+"""Logarithms of the factors of a wrong unit: knots, degrees, minutes."""
 SPEEDS, COURSES = "runs at several speeds", "runs on opposite courses"
 BESIDE = "the command read beside its instrument"
 
@@ -237,7 +239,7 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
     size = {"u": scales.speed, "v": scales.speed, "r": 1 / scales.passing, "psi": 1.0}
     unit = {"u": "m/s", "v": "m/s", "r": "rad/s", "psi": "rad"}
     of_log, drift = ("sensor u scale", "sensor velocity scale", "sensor u bias"), ("velocity through water",)
-    bias = {"u": of_log + drift, "v": ("sensor psi bias", *drift), "r": ()}
+    bias = {"u": of_log + drift, "v": ("sensor psi bias", *drift), "r": ("sensor r scale",)}
     bias["psi"] = ("positions in turned axes", "sensor v bias", "current", *drift)
     for name, equals in bias.items():
         yield Cause(
@@ -253,11 +255,12 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
     scaled: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
         "u": (("u",), (0, 4)), "v": (("v",), (1,)), "r": (("r",), (2, 3)), "velocity": (VELOCITY, (0, 1, 4, 5))
     }  # fmt: skip
+    same = {"u": of_log + drift, "velocity": of_log + drift, "r": ("sensor r bias",)}
     for key, (names, rows) in scaled.items():
         yield Cause(
-            f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.01, ratio=True, scaled=rows,
+            f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.01, ratio=True, scaled=rows, starts=UNITS,
             repair=f'[[repair]]\nkind = "scale"\ncolumns = {[*names]}\nfactor = {{over0}}',
-            equals=of_log + drift if "u" in names else (), tells=SPEEDS,
+            equals=same.get(key, ()), tells=SPEEDS,
         )  # fmt: skip
     for name in ("v", "r", "psi"):
         words = f"[columns.{name}]\nsign = -1  # times what is there"

@@ -19,7 +19,8 @@ the water or of the numbers of the vessel; it is fitted alone by Gauss-Newton fr
   and of the damping ahead, at few speeds;
 - delay of a command, a slower actuator, and all sensors early;
 - bias of psi, positions in turned axes, and on one course a current, velocity through water or bias of v;
-- bias and scale of u at one speed, velocity through water on one course, and scale of the velocity;
+- bias and scale of u at one speed, velocity through water on one course, and scale of the velocity; bias and scale of r
+  at one rate of turn;
 - lever arm of the position ahead, and its delay, at one speed and without turns; without a vessel also that of the
   velocity;
 - exchanged thrusters, and the sign of each where they are used against each other;
@@ -291,7 +292,8 @@ class _Log:
         for _ in range(rounds if len(theta) else 0):
             J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
             step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
-            step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta) if cause.ratio else step
+            if cause.ratio and not cause.scaled:
+                step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta)
             before = self.misfit(z)
             for _ in range(HALVINGS):
                 after, moved = change(theta + step)

@@ -27,7 +27,6 @@ from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.bands import LONG, Measure, band_refusal, check_level, measure_bands
 from shipid.identification.curvature import curvature_warning
-from shipid.identification.diagnosis import NONE, diagnose
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs, with_current
 from shipid.identification.plausible import implausibility
@@ -306,7 +305,6 @@ def run_identification(
         warnings = (
             *shared,
             *solution.warnings,
-            *filter(None, (_diagnosed_log(pair[AFTER], solution, dataset),)),
             *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
@@ -378,17 +376,6 @@ def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
         message = "more than numbers of it were changed after it was read: a patch on it is another vessel"
         raise ShipidError(f"{message}; write the change in a file that `extends` it, and load that", file=vessel.file)
     return read.digest, changed
-
-
-def _diagnosed_log(vessel: Vessel, solution: Solution, dataset: Dataset) -> str:
-    """What is wrong with the log beside what the fit estimates, by its diagnosis against the identified vessel."""
-    try:
-        found = diagnose(vessel, dataset, solution.runs)
-    except DataError:  # runs too short for it
-        return ""
-    known = {"current": "current", "lever_arm": "lever arm", "heading_bias": "sensor psi bias", "latency": "delay"}
-    words = [word for name, word in known.items() if name in solution.settings.widths]
-    return "" if found.cause == NONE or any(word in found.cause for word in words) else found.sentence
 
 
 def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:

@@ -42,9 +42,7 @@ def test_a_mistake_in_a_comparison_is_refused_before_the_look(
 ) -> None:
     from shipid.cli import identify
 
-    monkeypatch.setattr(
-        identify, "_diagnose_first", lambda *_: pytest.fail("it was compared with the log before")
-    )
+    monkeypatch.setattr(identify, "_diagnose_first", lambda *_: pytest.fail("it was compared with the log before"))
     log = write_dataset(trials(load_vessel("gunnerus-28.9"), runs=3, steps=30), tmp_path / "log.parquet")
     given = ["identify", "gunnerus-28.9", str(log), "--out", str(tmp_path / "a.toml"), "--structures", *arguments]
     assert remedy in str(CliRunner().invoke(app, given).exception)
