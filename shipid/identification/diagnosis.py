@@ -139,10 +139,9 @@ class _Log:
 
     def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
         stretches = [(run, rows) for run, rows in stretch_columns(dataset) if run in runs]
-        speed, rate = (
-            float(np.sqrt(np.mean(np.concatenate([of(rows) ** 2 for _, rows in stretches]))))
-            for of in (lambda rows: np.hypot(rows["u"], rows["v"]), lambda rows: rows["r"])
-        )
+        every = {name: np.concatenate([rows[name] for _, rows in stretches]) for name in ("u", "v", "r")}
+        speed = float(np.sqrt(np.mean(every["u"] ** 2 + every["v"] ** 2)))
+        rate = float(np.sqrt(np.mean(every["r"] ** 2)))
         usual = float(np.median(np.concatenate([np.diff(rows["t"]) for _, rows in stretches])))
         longest = max(float(np.ptp(rows["t"])) for _, rows in stretches)
         length = self.length or speed / max(rate, speed / MOST_PASSING / usual)
@@ -273,7 +272,7 @@ class _Log:
         path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
         turning = changes[3] - columns["r"][bumps] @ self.phi
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
-        return np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE)
+        return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
 
     def estimate(self, cause: Cause, rounds: int = ROUNDS) -> _Fit:
         """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
@@ -437,7 +436,8 @@ class _VesselLog(_Log):
 def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
     """A column at equal steps: an order holds from its row on; motion is averaged over a step, or goes on smoothly."""
     if is_command(name):
-        return values[np.clip(np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1, 0, len(t) - 1)]
+        last = np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
+        return np.asarray(values[np.clip(last, 0, len(t) - 1)])
     values = np.unwrap(values) if is_wrapped_angle(name) else values
     step = grid[1] - grid[0]
     if np.median(np.diff(t)) > 0.7 * step:

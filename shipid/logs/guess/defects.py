@@ -169,7 +169,7 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
         where, what = np.exp(1j * state.psi), key.removeprefix("sensor ").rpartition(" ")[0]
         if key == "lever arm position":
             path = np.asarray(path + complex(*size[:2]) * where)
-            repair: dict[str, Any] | None = {"kind": "lever_arm", "x": round(size[0], 2), "y": round(size[1], 2)}
+            repair: dict[str, Any] = {"kind": "lever_arm", "x": round(size[0], 2), "y": round(size[1], 2)}
             words = f"{size[0]:+.1f} m forward and {size[1]:+.1f} m to starboard of the velocities'"
             _find_cause(state, "lever arm", f"positions are of a point {words}", found, repair | {"moves": "position"})
         elif key == "sensor r scale":
