@@ -34,8 +34,8 @@ estimated without a part of the runs (or of the time, where there is one run) an
 The causes of least misfit also predict paths of 2.5 ship lengths, whose errors count as a seventh equation.
 
 - `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or the
-  one that does lowers the error of the paths by less than a share `WORTH`, or is smaller than what a log has anyhow
-  (a command that is a row late).
+  one that does lowers the error of the paths by less than a share `WORTH`; or that error is noise; or the cause is
+  smaller than what a log has anyhow (a command that is a row late).
 - The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
   the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
   and `equals` are the causes that remain.
@@ -144,7 +144,7 @@ class _Log:
         rate = float(np.sqrt(np.mean(every["r"] ** 2)))
         usual = float(np.median(np.concatenate([np.diff(rows["t"]) for _, rows in stretches])))
         longest = max(float(np.ptp(rows["t"])) for _, rows in stretches)
-        length = self.length or speed / max(rate, speed / MOST_PASSING / usual)
+        length = self.length or max(speed / max(rate, speed / MOST_PASSING / usual, 1e-12), 1e-3)
         self.scales = Scales(length, max(speed, 1e-6 * length / usual), usual)
         self.width = max(min(LENGTHS * self.scales.passing, longest / 4), 8 * usual)
         self.step = self.width / POINTS
@@ -556,7 +556,7 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     shown = (
         gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
     )
-    if not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
+    if missed < log.blur or not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
     behind = {key: log.gain(seen[key], seen[order[0]]) for key in order[1:]}
     tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]

@@ -7,6 +7,7 @@ import re
 import textwrap
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import reduce
 from itertools import product
@@ -198,7 +199,10 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
             raise
         raise DivergenceError(f"{error.message}; but first: {failed[0]}", file=error.file, path=error.path) from None
     others = [name for name in usable if name not in tests]
-    found = {name: diagnose(vessel, dataset, others) for name, vessel in vessels.items()}
+    found = dict[str, Diagnosis]()
+    for name, vessel in vessels.items():
+        with suppress(DataError):  # runs of a few rows
+            found[name] = diagnose(vessel, dataset, others)
     wrong = [f"{vessels[name].name}: {one.sentence}" for name, one in found.items() if one.cause != NONE]
     warnings = [*failed, *notes, *wrong]
     return Draft(_study_text(choices, warnings), choices, plan, warnings, found)

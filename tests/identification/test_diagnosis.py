@@ -92,6 +92,13 @@ def test_a_shaft_without_its_sign_is_named() -> None:
     assert found.cause in ("command port.n unsigned", "command starboard.n unsigned")
 
 
+def test_a_ship_at_rest_is_not_blamed() -> None:
+    log = log_of(1)
+    still = dict.fromkeys((*log.commands, "u", "v", "r", "north", "east"), 0.0)
+    for vessel in (SHIP, None):
+        assert diagnose(vessel, Dataset(log.frame.assign(psi=0.3, **still), log.metadata)).cause == NONE
+
+
 def test_runs_too_short_for_a_bump_are_refused() -> None:
     log = log_of(1)
     with pytest.raises(DataError, match="no stretch is longer than"):
