@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.study.survey import first_look
+from shipid.identification.diagnosis import diagnose
 from shipid.vessel.template import Particulars, first_guess
 from tests.benchmarks.strangers import true_dataset
 from tests.strangers import Stranger, stranger
@@ -34,10 +34,9 @@ def test_its_first_guess_is_judged_by_its_log(ship: Stranger) -> None:
     given = Particulars(*sizes, speed=float(known["speed"]), rpm=float(known["rpm"]), scale=float(known["scale"]))
     guess = first_guess(given, "guess", "guess.toml").vessel
     pace = sizes[0] / float(known["speed"])
-    view = first_look(guess, ship.dataset, ship.dataset.runs, ahead=2.5 * pace, step=pace / 4)
-    assert np.isfinite([view.vessel_error, view.constant_error]).all()
-    assert view.wrong == (view.vessel_error >= view.constant_error or view.turning < 0)
-    assert f"{view.constant_error:.3g} m" in view.sentence
+    found = diagnose(guess, ship.dataset)
+    assert found.ahead == pytest.approx(2.5 * pace, rel=1.0)
+    assert f"err by {found.error:.3g} m" in found.sentence
 
 
 @pytest.mark.parametrize("way", [1, -1], ids=["as it is", "mirrored"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -12,7 +13,7 @@ from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, show_steps
-from shipid.errors import ShipidError
+from shipid.errors import DataError, ShipidError
 from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
@@ -183,13 +184,15 @@ def data_join(
 @app.command("check")
 def data_check(
     dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
+    vessel: Annotated[str | None, typer.Option(help="vessel that made the log: what is wrong with both")] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position."""
     from shipid.data.held import warn_of_constant_commands
+    from shipid.identification.diagnosis import NONE, diagnose
 
-    log = shipid.read_dataset(dataset)
+    log, ship = shipid.read_dataset(dataset), shipid.load_vessel(vessel) if vessel else None
     checks = shipid.check_dataset(log)
     failed = checks[~checks["ok"].astype(bool)]
     counts = checks.assign(failed=checks.index.isin(failed.index)).groupby("check", sort=False)
@@ -207,7 +210,12 @@ def data_check(
         answer.say(f"{passed} of {len(checks)} checks passed", passed=passed)
         notes = warn_of_constant_commands(log, log.runs)
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-    if len(failed):
+        cause = NONE
+        with suppress(DataError):  # of runs too short for it the checks say all there is
+            found = diagnose(ship, log)
+            cause = found.cause
+            answer.say(f"{ship.name if ship else 'the motion alone'}: {found.sentence}", cause=cause)
+    if len(failed) or cause != NONE:
         raise typer.Exit(1)
 
 

@@ -18,8 +18,6 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.units import join_names, plural_word
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identification
     from shipid.identification.settings import Identify
@@ -135,7 +133,7 @@ def identify_command(
             check_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ()
             )
-        _look_first(ship, log, runs or (), test or (), answer)
+        _diagnose_first(ship, log, runs or (), test or (), answer)
         if structures is not None:
             _compare_structures(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
@@ -213,7 +211,6 @@ def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     answer.records("manoeuvres", compared.manoeuvres, MEASURE | heads, shown=compared.manoeuvres[measured])
     answer.say("between: range over the structures not shown to be worse; within: the widest interval of one of them")
     answer.records("spread", compared.spread, MEASURE | {"spread": "between", "width": "within"})
-    _show_groups(compared.groups, f"of {compared.chosen}, on runs that the fit has not seen", answer)
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
     notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & ~measured]
     answer.warn(
@@ -225,31 +222,20 @@ def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     )
 
 
-def _show_groups(groups: DataFrame, whose: str, answer: Answer) -> None:
-    """Print errors by side, helm and speed, if there are any."""
-    from shipid.identification.sides import HEADS, side_table_rows
-
-    if len(groups):
-        answer.say(f"Errors by side, helm and speed {whose}:")
-        rows = [dict(zip(HEADS, row, strict=True)) for row in side_table_rows(groups)]
-        answer.records("groups", groups, shown=rows)
-
-
-def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
-    """Say before anything is fitted whether the vessel predicts the log better than constant u, v, r."""
+def _diagnose_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
+    """Say before anything is fitted what is wrong with the vessel as it is and the log."""
+    from shipid.identification.diagnosis import NONE, diagnose
     from shipid.identification.outcome import pick_runs, without_shared
-    from shipid.study.new import proposed_horizon
-    from shipid.study.survey import first_look, survey_dataset
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     with suppress(DataError), show_steps("comparing the vessel as it is with the runs, before the fit"):
-        ahead, step, _ = proposed_horizon(ship, survey_dataset(log))  # where it cannot, the fit says what is missing
-        look = first_look(ship, log, fitted, ahead=ahead, step=step)
-        if look.wrong:
-            typer.echo(f"warning: {look.sentence}", err=True)
+        found = diagnose(ship, log, fitted)  # where it cannot, the fit says what is missing
+        sentence = f"{ship.name} as it is: {found.sentence}"
+        if found.cause != NONE:
+            typer.echo(f"warning: {sentence}", err=True)
         else:
-            answer.say(look.sentence)
-        answer.say(first_look=look.sentence)
+            answer.say(sentence)
+        answer.say(diagnosis=sentence, cause=found.cause)
 
 
 def _show_identified(outcome: Identification, answer: Answer) -> None:
@@ -273,7 +259,6 @@ def _show_identified(outcome: Identification, answer: Answer) -> None:
     heads = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before", "after": "after"}
     answer.records("outputs", outcome.outputs, heads)
     _show_manoeuvres(outcome, answer)
-    _show_groups(outcome.groups, f"on {'runs held out' if outcome.held_out else 'the fitted runs'}", answer)
     worth = outcome.solution.effective
     if worth:
         words = ", ".join(f"{name} {count:.0f}" for name, count in worth.items())

@@ -73,7 +73,8 @@ def study_new(
         answer.records("choices", choices, shown=[])
         answer.say("\n".join(f"{one['path']} = {one['value']}  # {one['why']}".removesuffix("  # ") for one in choices))
         answer.warn(draft.warnings)
-        answer.say("\n".join(look.sentence for look in draft.looks.values() if not look.wrong))
+        sound = [f"{name}: {one.sentence}" for name, one in draft.diagnoses.items() if one.cause == "none"]
+        answer.say("\n".join(sound), causes={name: one.cause for name, one in draft.diagnoses.items()})
         models = [model.name for model in draft.plan.foundations]
         named = f"{len(models)} {plural_word(len(models), 'foundation')} ({', '.join(models)})"
         sentence = f"{draft.plan.cells} cells of {named} -> {file}"

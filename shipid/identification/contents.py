@@ -37,7 +37,6 @@ def identification_content(outcome: Identification, dataset: str | Path, command
         colours=outcome.colours,
         profiles=pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(),
         programme=pd.DataFrame() if outcome.programme is None else outcome.programme,
-        groups=outcome.groups,
         beyond=outcome.beyond,
         provenance={
             "Vessel": f"{outcome.vessel.name}, digest {outcome.vessel.digest}",

@@ -25,17 +25,14 @@ from shipid.engine.engines import REPEATED
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.files import write_new
 from shipid.identification import design
-from shipid.identification.antenna import antenna_fit
 from shipid.identification.bands import LONG, Measure, band_refusal, check_level, measure_bands
 from shipid.identification.curvature import curvature_warning
 from shipid.identification.fit import Progress
 from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs, with_current
-from shipid.identification.late_fit import late_fit
 from shipid.identification.plausible import implausibility
 from shipid.identification.profile import Profile, profile_factor, variance_ratio
 from shipid.identification.reach import data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
-from shipid.identification.sides import by_group, uneven_side_warnings
 from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import (
@@ -89,8 +86,7 @@ class Identification:
     free : set (`fit`, `test`) -> free runs `before` and `after`.
     manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`; with a band also `low` and `high`.
     colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
-    groups : errors of `shipid.identification.sides.by_group` on runs held out, else on fitted ones. beyond : sentences
-    on standard manoeuvres that go farther than the fitted runs.
+    beyond : sentences on standard manoeuvres that go farther than the fitted runs.
     outputs : of components: `output`, `unit`, root mean square `measured`, and of the difference `before` and `after`.
     programme : manoeuvres to run next, of `shipid.identification.design.rank_candidates`; None: not requested.
     """
@@ -109,7 +105,6 @@ class Identification:
     programme: pd.DataFrame | None
     profiles: tuple[Profile, ...]
     warnings: tuple[str, ...]
-    groups: pd.DataFrame
     beyond: tuple[str, ...]
     outputs: pd.DataFrame
 
@@ -311,7 +306,6 @@ def run_identification(
         warnings = (
             *shared,
             *solution.warnings,
-            *filter(None, (_in_log(solution, dataset, judged),)),
             *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
@@ -327,8 +321,6 @@ def run_identification(
         warnings += _implausible_estimates(vessel, pair[AFTER], solution.values)
         outputs = _compare_outputs(pair, solution, dataset, fitted)
         warnings += tuple(_unused_output_warnings(outputs, settings))
-        groups = _errors_by_group(pair[AFTER], solution, dataset, tested or fitted, settings)
-        warnings += uneven_side_warnings(groups)
         ranked = None
         if programme:
             ranked, missing = _next_manoeuvres(pair[AFTER], dataset, fitted, solution, judged)
@@ -350,7 +342,6 @@ def run_identification(
             programme=ranked,
             profiles=curves,
             warnings=warnings,
-            groups=groups,
             beyond=_extrapolated_manoeuvres(pair[AFTER], dataset, fitted, logs),
             outputs=outputs,
         )
@@ -388,12 +379,6 @@ def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
     return read.digest, changed
 
 
-def _in_log(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
-    """A sentence on what the log lacks or has wrong, as the residuals show it: the first that is seen; else none."""
-    seen = (find(solution, dataset, judged) for find in (antenna_fit, late_fit))
-    return next(filter(None, seen), "")
-
-
 def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
     judgements = {path: implausibility(vessel, path, values) for path in values}
     judgements |= {
@@ -416,16 +401,6 @@ def _no_estimate_reason(solution: Solution) -> str:
     if len(solution.dropped) == len(solution.paths):
         return f"every parameter was dropped, because the data do not support a change of any: {remedy}"
     return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
-
-
-def _errors_by_group(
-    vessel: Vessel, solution: Solution, dataset: Dataset, runs: Sequence[str], settings: Identify
-) -> pd.DataFrame:
-    """Errors by side, helm and speed, in the current of all runs that was estimated with the vessel."""
-    if any(solution.common_current):
-        vessel, settings = with_current(vessel, settings, runs, solution.common_current)
-    series = simulate_free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
-    return by_group(series, AFTER, vessel, dataset)
 
 
 def _compare_outputs(

@@ -21,7 +21,7 @@ from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate_step
 from shipid.identification.settings import MOVING
 from shipid.interrupts import hold_interrupts
-from shipid.physics.signals import is_output
+from shipid.physics.signals import is_output, is_steering
 from shipid.simulation.log import body_velocities, horizontal_velocities
 from shipid.vessel.dynamics import Dynamics
 
@@ -149,7 +149,13 @@ class _Ship:
         commands = _delay_commands(layout, self.commands, self.value_of)
         environment = _environment_channels(layout, self.weather, self.value_of)
         parameters = _scaled_parameters(layout, self.base, self.scale, self.theta, self.value_of)
-        self.inputs = [self.memory, commands, environment, parameters]
+        self.orders = [self.memory, commands, environment, parameters]
+        zero = self.value_of.get("helm_zero", SX(1, 1))
+        memory, actual = (
+            part - zero * ca.DM([float(is_steering(name)) for name in names])
+            for part, names in ((self.memory, model.memory), (commands, model.commands))
+        )
+        self.inputs = [memory, actual, environment, parameters]
 
     @property
     def moving(self) -> SX:
@@ -183,7 +189,7 @@ class _Ship:
 
     def advance(self, dt: SX) -> SX:
         """Actuator states after a time dt [s]."""
-        return SX(self.model.advance(SX(len(self.names), 1), *self.inputs, dt))
+        return SX(self.model.advance(SX(len(self.names), 1), *self.orders, dt))
 
     def signals(self, state: SX, names: Sequence[str], values: SX) -> SX:
         """Fitted signals: of the whole state, of which `values` are those called `names`."""
@@ -291,17 +297,18 @@ def _sensed_signals(signals: Sequence[str], state: Mapping[str, SX], value_of: M
     """Signals of a log with the sensor faults in `value_of`, from the true states and outputs.
 
     Velocities are horizontal. heading_bias [rad] is added to the true heading, and u and v are resolved along the
-    biased heading: the velocity over ground is unchanged. The logged point is lever_arm [m] ahead of the origin.
+    biased heading: the velocity over ground is unchanged, and then times velocity_scale. The logged point is lever_arm
+    [m] ahead of the origin.
     """
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
     u, v, r = map(SX, horizontal_velocities({**dict.fromkeys(("u", "v", "r"), zero), **state}, ca).values())
     psi = state.get("psi", zero)
-    across = v + x * r
+    across, scale = v + x * r, value_of.get("velocity_scale", zero + 1)
     read = {
-        "u": lambda: ca.cos(b) * u + ca.sin(b) * across + value_of.get("velocity_bias_u", zero),
-        "v": lambda: ca.cos(b) * across - ca.sin(b) * u + value_of.get("velocity_bias_v", zero),
-        "r": lambda: r,
+        "u": lambda: scale * (ca.cos(b) * u + ca.sin(b) * across) + value_of.get("velocity_bias_u", zero),
+        "v": lambda: scale * (ca.cos(b) * across - ca.sin(b) * u) + value_of.get("velocity_bias_v", zero),
+        "r": lambda: r + value_of.get("rate_bias", zero),
         "psi": lambda: psi + b,
         "north": lambda: state["north"] + x * ca.cos(psi),
         "east": lambda: state["east"] + x * ca.sin(psi),
@@ -314,10 +321,11 @@ def _initial_state(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[S
     entry = {name: SX.sym(name) for name in _initial_columns(states)}
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
-    u, v = (entry[name] - value_of.get(f"velocity_bias_{name}", zero) for name in ("u", "v"))
-    psi = entry["psi"] - b
+    scale = value_of.get("velocity_scale", zero + 1)
+    u, v = ((entry[name] - value_of.get(f"velocity_bias_{name}", zero)) / scale for name in ("u", "v"))
+    psi, r = entry["psi"] - b, entry["r"] - value_of.get("rate_bias", zero)
     true = dict(entry)
-    true |= {"u": ca.cos(b) * u - ca.sin(b) * v, "v": ca.sin(b) * u + ca.cos(b) * v - x * entry["r"], "psi": psi}
+    true |= {"u": ca.cos(b) * u - ca.sin(b) * v, "v": ca.sin(b) * u + ca.cos(b) * v - x * r, "psi": psi, "r": r}
     true |= body_velocities(true, ca)
     true |= {"north": entry["north"] - x * ca.cos(psi), "east": entry["east"] - x * ca.sin(psi)}
     return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))

@@ -37,22 +37,31 @@ NUISANCES: dict[str, dict[str, float]] = {
     "latency": {"latency": 0.0},
     "heading_bias": {"heading_bias": 0.0},
     "velocity_bias": {"velocity_bias_u": 0.0, "velocity_bias_v": 0.0},
+    "velocity_scale": {"velocity_scale": 1.0},
+    "rate_bias": {"rate_bias": 0.0},
+    "helm_zero": {"helm_zero": 0.0},
     "lever_arm": {"lever_arm": 0.0},
 }
 """Name in `nuisance` -> its scalars with their fault-free values."""
-UNITS_OF_NUISANCES = {"thrust_scale": "1", "latency": "s", "heading_bias": "rad", "lever_arm": "m"} | dict.fromkeys(
-    ("current_north", "current_east", "velocity_bias_u", "velocity_bias_v"), "m/s"
-)
+UNITS_OF_NUISANCES = {
+    **dict.fromkeys(("thrust_scale", "velocity_scale"), "1"),
+    **dict.fromkeys(("heading_bias", "helm_zero"), "rad"),
+    **{"latency": "s", "lever_arm": "m", "rate_bias": "rad/s"},
+    **dict.fromkeys(("current_north", "current_east", "velocity_bias_u", "velocity_bias_v"), "m/s"),
+}
 """Scalar of a nuisance -> its unit."""
-MOVING = ("current_north", "current_east", "thrust_scale", "latency")
+MOVING = ("current_north", "current_east", "thrust_scale", "latency", "helm_zero")
 """Scalars that change the motion; the others change only the measurement."""
 WIDE = {"initial_state": 1.0, "current": 5.0, "thrust_scale": 0.1, "latency": 1.0, "lever_arm": 10.0} | {
     "heading_bias": math.radians(3.0),
     "velocity_bias": 1.0,
+    "velocity_scale": 0.1,
+    "rate_bias": 1.0,
+    "helm_zero": math.radians(3.0),
 }
 """Nuisance -> width where the settings name none; of a current and velocity_bias in typical errors of u, of a lever
-arm in those of a position (`shipid.identification.residuals.typical_errors`)."""
-WIDTH_UNITS = {"current": "u", "velocity_bias": "u", "lever_arm": "north"}
+arm in those of a position, of rate_bias in those of r (`shipid.identification.residuals.typical_errors`)."""
+WIDTH_UNITS = {"current": "u", "velocity_bias": "u", "lever_arm": "north", "rate_bias": "r"}
 
 
 class Identify(CheckedModel, BaseModel):
@@ -60,7 +69,8 @@ class Identify(CheckedModel, BaseModel):
 
     weights : standard deviations of the signals [m/s, rad/s, rad, m], and of measured outputs by the names of their
     columns (`propeller.thrust` [N]). Widths of nuisances: standard deviations of the weights (initial_state), m/s
-    (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency), 1 (thrust_scale).
+    (current, velocity_bias), rad (heading_bias, helm_zero), rad/s (rate_bias), m (lever_arm), s (latency), 1
+    (thrust_scale, velocity_scale).
     """
 
     parameters: Annotated[list[str], Field(min_length=1)] = Field(

@@ -15,7 +15,7 @@ from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.identification.covariance import invert_information
 from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_factors, initial_point, search_factors
 from shipid.identification.late import COARSE, row_interval
-from shipid.identification.residuals import Problem, build_problem, predict_residuals, typical_errors
+from shipid.identification.residuals import Problem, build_problem, typical_errors
 from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_columns
 from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
@@ -77,28 +77,6 @@ def identify(
         solution = replace(again, effective=effective, warnings=solution.warnings, seconds=seconds)
     problem = build_problem(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
     return replace(solution, objective_start=evaluate_factors(problem, *_initial_unknowns(problem, start)).objective)
-
-
-def by_log(solution: Solution, dataset: Dataset, other: Dataset) -> Array | None:
-    """Change (m,) of the residuals from the log of a fit to another one, as a column of the Jacobian.
-
-    None where a prediction diverges, or the other log has other rows.
-    """
-    point = solution.point
-    here, there = (
-        predict_residuals(
-            build_problem(solution.vessel, log, solution.runs, solution.settings),
-            solution.factors,
-            point.nuisances,
-            point.away,
-        )
-        for log in (dataset, other)
-    )
-    if there.r.shape != here.r.shape or not np.isfinite(there.r).all():
-        return None
-    with_change = replace(here, by_factor=np.column_stack([here.by_factor, there.r - here.r]))
-    jacobian = with_change.marginal(solution.settings.linear_from, solution.within)[1]
-    return np.asarray(jacobian[:, -1])
 
 
 def _discount_residuals(solution: Solution) -> tuple[Identify, dict[str, float]]:

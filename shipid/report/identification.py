@@ -30,7 +30,6 @@ from shipid.report.figure import (
 )
 from shipid.report.motion import LOG_SERIES, MOTION_AXES, motion_figure
 from shipid.report.page import Section, write_page
-from shipid.report.structures import group_errors
 from shipid.report.tables import (
     MISSING,
     PageTable,
@@ -100,7 +99,7 @@ class IdentificationContent(PageContent):
     [rad/s].
     ahead : length of a free run [s], 0 for whole runs. manoeuvres : manoeuvre, measure, unit, before, after, note.
     colours : signal, lag [s], correlation of the residuals. profiles : path, factor, rise, limit, sentence.
-    groups : errors by side, helm and speed. beyond : manoeuvres that go farther than the data.
+    beyond : manoeuvres that go farther than the data.
     programme : manoeuvre, hours, gain [bit], per_hour, narrows, before, after.
     """
 
@@ -116,7 +115,6 @@ class IdentificationContent(PageContent):
     colours: pd.DataFrame
     profiles: pd.DataFrame = field(default_factory=empty_frame())
     programme: pd.DataFrame = field(default_factory=empty_frame())
-    groups: pd.DataFrame = field(default_factory=empty_frame())
     beyond: Sequence[str] = ()
 
     @property
@@ -394,12 +392,6 @@ IDENTIFICATION_PAGE = {
     "what-is-left": Section(
         "What is left over",
         {
-            "sides": (
-                lambda one: group_errors(
-                    one.groups, f"{'Runs held out' if one.held_out else 'Fitted runs'}, over the horizon of the fit."
-                ),
-                "groups",
-            ),
             "residuals": (residuals_figure, "colours"),
             "profiles": (profiles_figure, "profiles"),
         },

@@ -17,17 +17,6 @@ from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, 
 from shipid.report.wording import fixed_text
 from shipid.units import digit_decimals
 
-GROUP_ERRORS = {
-    "group": "group",
-    "turning to": "side",
-    "rows": "rows",
-    "u [m/s]": "u",
-    "v [m/s]": "v",
-    "r [deg/s]": "r",
-    "turning [%]": "turning",
-    "standard error": "error",
-}
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StructuresContent(PageContent):
@@ -38,7 +27,6 @@ class StructuresContent(PageContent):
     errors: pd.DataFrame
     manoeuvres: pd.DataFrame
     spread: pd.DataFrame
-    groups: pd.DataFrame
     chosen: str
     cautions: Mapping[str, str]
     ahead: float
@@ -121,28 +109,12 @@ def _measure_cell(row: Mapping[Any, Any]) -> TableCell:
     return TableCell(fixed_text(value, places) + ends, value)
 
 
-def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable:
-    """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`."""
-    shown = frame.assign(r=DEGREES * frame["r"], turning=100 * frame["turning"], error=100 * frame["error"])
-    takeaway += " Turning: predicted change of heading over the measured one, less 1."
-    return frame_table("sides", "Errors by side, helm and speed", takeaway, shown, GROUP_ERRORS)
-
-
 STRUCTURES_PAGE = {
     "structures": Section(
         "Which structure", {"structures": (structures_table, "table"), "runs": (runs_table, "errors")}
     ),
     "manoeuvres": Section(
         "What each says of standard manoeuvres", {"manoeuvres": (structure_manoeuvres, "manoeuvres")}
-    ),
-    "sides": Section(
-        "Where it is wrong",
-        {
-            "sides": (
-                lambda one: group_errors(one.groups, f"{one.chosen}, on runs that the fit has not seen."),
-                "groups",
-            )
-        },
     ),
 }
 write_structures = partial(write_page, "structures", STRUCTURES_PAGE)

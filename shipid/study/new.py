@@ -7,6 +7,7 @@ import re
 import textwrap
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import reduce
 from itertools import product
@@ -21,13 +22,14 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
 from shipid.hybrid.physics import check_columns
+from shipid.identification.diagnosis import NONE, Diagnosis, diagnose
 from shipid.physics.signals import SIGNALS, drive_scale, is_steering, signal_of
 from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import obtain_runs, partition, prepare
-from shipid.study.survey import Look, Survey, first_look, separation_of_sources, survey_dataset, typical_runs
+from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
 from shipid.units import RPM, percent_text, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -77,14 +79,14 @@ class Draft:
 
     text : TOML with the reasons as comments.
     warnings : failed checks of the log, notes of the study, and vessels that do not fit the log.
-    looks : how each vessel and the runs that do not test agree, by its name in the study.
+    diagnoses : what is wrong with each vessel and the runs that do not test, by its name in the study.
     """
 
     text: str
     choices: Sequence[Choice]
     plan: Plan
     warnings: Sequence[str] = ()
-    looks: Mapping[str, Look] = field(default_factory=dict)
+    diagnoses: Mapping[str, Diagnosis] = field(default_factory=dict)
 
 
 def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
@@ -208,10 +210,13 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
             raise
         raise DivergenceError(f"{error.message}; but first: {failed[0]}", file=error.file, path=error.path) from None
     others = [name for name in usable if name not in tests]
-    how: dict[str, Any] = {"ahead": ahead, "step": plan.study.prediction.step, "path": true_path.value}
-    looks = {name: first_look(vessel, dataset, others, **how) for name, vessel in vessels.items()}
-    warnings = [*failed, *notes, *(look.sentence for look in looks.values() if look.wrong)]
-    return Draft(_study_text(choices, warnings), choices, plan, warnings, looks)
+    found = dict[str, Diagnosis]()
+    for name, vessel in vessels.items():
+        with suppress(DataError):  # runs of a few rows
+            found[name] = diagnose(vessel, dataset, others)
+    wrong = [f"{vessels[name].name}: {one.sentence}" for name, one in found.items() if one.cause != NONE]
+    warnings = [*failed, *notes, *wrong]
+    return Draft(_study_text(choices, warnings), choices, plan, warnings, found)
 
 
 def _warn_of_failed_checks(seen: Survey, data: Path) -> list[str]:

@@ -37,7 +37,6 @@ from shipid.identification.outcome import (
 )
 from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import Identify
-from shipid.identification.sides import by_group, uneven_side_warnings
 from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, LinearFit, Statistics, fit_statistics
@@ -85,8 +84,6 @@ class StructureComparison:
         and `width`, the greatest width of the interval within one of them.
     uninformative : structure -> why it is left out of the spread: a length of a manoeuvre whose interval holds 0.
     beyond : sentences on manoeuvres that go farther than the data.
-    groups : errors by side, helm and speed of the chosen structure on runs that the fit has not seen.
-    uneven : sentences on sides.
     """
 
     vessel: Vessel
@@ -104,8 +101,6 @@ class StructureComparison:
     spread: pd.DataFrame
     uninformative: Mapping[str, str]
     beyond: tuple[str, ...]
-    groups: pd.DataFrame
-    uneven: tuple[str, ...]
 
     @property
     def sentences(self) -> list[str]:
@@ -132,7 +127,7 @@ class StructureComparison:
                 f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
                 f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
             )
-        return [*notes, *self.beyond, *self.uneven]
+        return [*notes, *self.beyond]
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
@@ -194,19 +189,17 @@ def compare_structures(
     check_length(settings, length)
     settings, report = settings.with_current_named(), say or (lambda _: None)
     parts = [part for number in range(folds) if (part := fitted[number::folds])]
-    errors, fits, notes, series = list[pd.DataFrame](), dict[str, FittedStructure](), dict[str, str](), dict[str, Any]()
+    errors, fits, notes = list[pd.DataFrame](), dict[str, FittedStructure](), dict[str, str]()
     for name in names:
         try:
-            frames, whole, seen = _errors_and_fit(
-                vessel, name, dataset, settings, parts, fitted, tested, length, report
-            )
+            frames, whole = _errors_and_fit(vessel, name, dataset, settings, parts, fitted, tested, length, report)
         except DataError:
             raise
         except ShipidError as error:
             notes[name] = error.message
             continue
         errors += [frame.assign(structure=name) for frame in frames]
-        fits[name], series[name] = whole, seen
+        fits[name] = whole
     if not fits:
         raise ShipidError("; ".join(f"{name}: {note}" for name, note in notes.items()))
     every = pd.concat(errors, ignore_index=True)
@@ -223,7 +216,6 @@ def compare_structures(
     silent = uninformative_structures(manoeuvres)
     for name in silent.keys() - {chosen}:
         table.loc[table["structure"] == name, ["equal", "note"]] = False, silent[name]
-    groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
     return StructureComparison(
         vessel=vessel,
         runs=fitted,
@@ -244,8 +236,6 @@ def compare_structures(
         spread=_spread_of_measures(manoeuvres, [name for name in equal if name not in silent]),
         uninformative=silent,
         beyond=far,
-        groups=groups,
-        uneven=uneven_side_warnings(groups),
     )
 
 
@@ -288,8 +278,8 @@ def _errors_and_fit(
     tested: Sequence[str],
     ahead: float,
     report: SayStep,
-) -> tuple[list[pd.DataFrame], FittedStructure, pd.DataFrame]:
-    """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
+) -> tuple[list[pd.DataFrame], FittedStructure]:
+    """Errors of runs by fits that have not seen them, and the fit to all runs."""
 
     def fit(runs: Sequence[str], others: Sequence[str]) -> tuple[Vessel, Solution]:
         """A fit to some runs; the others decide nothing in it, neither its start nor its priors."""
@@ -308,19 +298,18 @@ def _errors_and_fit(
         return simulate_free_runs({name: sea}, dataset, runs, known, ahead)
 
     whole, solution = fit(fitted, ())
-    frames, series = [], []
+    frames = []
     for part in parts:
         rest = [run for run in fitted if run not in part]
         replayed = replay(*fit(rest, part), part)
         frames.append(replayed.errors[replayed.errors["run"] != ALL])
-        series.append(replayed.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
     if tested:
         test = replay(whole, solution, tested)
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
     judged = fit_statistics(LinearFit.of(solution))
     caution = band_refusal(solution, judged, residual_spacing(solution))
-    return errors, FittedStructure(whole, solution, judged, caution), pd.concat(series, ignore_index=True)
+    return errors, FittedStructure(whole, solution, judged, caution)
 
 
 def _with_mean(errors: pd.DataFrame) -> pd.DataFrame:
@@ -489,7 +478,6 @@ def structures_content(compared: StructureComparison, dataset: str | Path, comma
         errors=compared.errors,
         manoeuvres=compared.manoeuvres,
         spread=compared.spread,
-        groups=compared.groups,
         chosen=compared.chosen,
         cautions={name: fit.caution for name, fit in compared.fits.items()},
         ahead=compared.ahead,

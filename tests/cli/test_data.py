@@ -21,7 +21,7 @@ def test_data_import_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "41 rows in 1 run -> plain.parquet" in text
     assert read_dataset("plain.parquet").runs == ["good"]
     output_of("data", "import", BAD / "logs" / "plain.toml", BAD / "logs" / "good.csv", "--out", "deep/other.parquet")
-    assert "10 of 10 checks passed" in output_of("data", "check", "deep/other.parquet")
+    assert re.search(r"(\d+) of \1 checks passed", output_of("data", "check", "deep/other.parquet"))
 
 
 def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
@@ -30,7 +30,7 @@ def test_data_check_tells_what_fails(tmp_path: Path, tiny_run: Path) -> None:
     file = write_dataset(type(dataset)(wrong, dataset.metadata), tmp_path / "wrong.parquet")
     result = CliRunner().invoke(app, ["data", "check", str(file)])
     assert result.exit_code == 1
-    assert re.search(r"M001 +heading", result.output), "failures are listed by run"
+    assert "sensor r bias = 0.5" in result.output
     assert "the same in all" not in result.output
     held = dataset.frame.assign(**dict.fromkeys(dataset.commands, 0.2))
     file = write_dataset(type(dataset)(held, dataset.metadata), tmp_path / "held.parquet")

@@ -42,7 +42,7 @@ def test_a_mistake_in_a_comparison_is_refused_before_the_look(
 ) -> None:
     from shipid.cli import identify
 
-    monkeypatch.setattr(identify, "_look_first", lambda *_: pytest.fail("the vessel was compared with the log before"))
+    monkeypatch.setattr(identify, "_diagnose_first", lambda *_: pytest.fail("it was compared with the log before"))
     log = write_dataset(trials(load_vessel("gunnerus-28.9"), runs=3, steps=30), tmp_path / "log.parquet")
     given = ["identify", "gunnerus-28.9", str(log), "--out", str(tmp_path / "a.toml"), "--structures", *arguments]
     assert remedy in str(CliRunner().invoke(app, given).exception)
@@ -58,7 +58,7 @@ def test_the_answer_of_a_comparison_for_programs_has_all_that_is_shown(capsys: p
     diverges = {"structure": "mmg", "manoeuvre": "turning 35 to port", "measure": "", "note": "diverges"}
     spread = {"manoeuvre": "turning 35 to port", "measure": "advance", "spread": 2.0, "width": 1.0}
     compared = SimpleNamespace(
-        vessel=load_vessel("gunnerus-28.9"), runs=("a", "b"), ahead=20.0, table=table, groups=[], sentences=["best"],
+        vessel=load_vessel("gunnerus-28.9"), runs=("a", "b"), ahead=20.0, table=table, sentences=["best"],
         manoeuvres=pd.DataFrame([diverges]), spread=pd.DataFrame([spread]), shared=("shared",), chosen="mmg",
         fits={"mmg": SimpleNamespace(caution="wide")},
     )  # fmt: skip

@@ -256,7 +256,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.identification.outcome:check_identification": lambda *_, **__: None,
         "shipid.study.structures:check_comparison": lambda *_, **__: None,
         "shipid.identification.segments:too_short": lambda *_: [],
-        "shipid.cli.identify:_look_first": lambda *_: None,
+        "shipid.cli.identify:_diagnose_first": lambda *_: None,
         "shipid.engine.engines:check_device": lambda *_: None,
         "shipid.engine.engines:engine_by_name": lambda *_: None,
         "shipid.study.prepare:obtain_runs": lambda *_: LOG,

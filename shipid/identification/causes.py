@@ -1,0 +1,351 @@
+"""Causes of a misfit, as changes of a resampled log or of the numbers of a vessel: the hypotheses of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipid.data.dataset import Array
+from shipid.identification.sensitivities import is_thrust
+from shipid.physics.signals import is_shaft, is_steering, signal_of
+from shipid.vessel.load import Vessel
+from shipid.vessel.schema import SHARED
+
+VELOCITY, POSITION = ("u", "v"), ("north", "east")
+GEOMETRY = frozenset((*SHARED, "x_aft", "x_fwd", "L_pp", "T", "rho", "nabla"))
+LATE, EARLY = (0.3, 1.0, 2.0, 4.0), (-1.0, -0.3)  # delays from which a fit may begin, in times of a ship length
+UNITS = tuple(sign * float(np.log(unit)) for unit in (1852 / 3600, np.pi / 180, 1 / 60) for sign in (1, -1))
+"""Logarithms of the factors of a wrong unit: knots, degrees, minutes."""
+SPEEDS, COURSES = "runs at several speeds", "runs on opposite courses"
+BESIDE = "the command read beside its instrument"
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A log at equal steps: columns (N,) SI of all stretches one after the other, and the numbers of the vessel (P,).
+
+    stretches : slice of each stretch. runs : number of the run of each stretch. step : [s].
+    """
+
+    columns: Mapping[str, Array]
+    parameters: Array
+    stretches: tuple[slice, ...]
+    runs: tuple[int, ...]
+    step: float
+
+    def put(self, columns: Mapping[str, Array]) -> Motion:
+        """The same log with some columns replaced."""
+        return replace(self, columns={**self.columns, **columns})
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Length [m], speed [m/s] and interval of the rows [s] of a log, which set the size of trials."""
+
+    length: float
+    speed: float
+    interval: float
+
+    @property
+    def passing(self) -> float:
+        """Time [s] in which the ship runs its length."""
+        return self.length / self.speed
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What may be wrong.
+
+    key : its name. change : (log, size) -> the log as it would be without it. trial : size of a trial step, one number
+        for each entry of the size; empty for a cause without a size. unit : of the size.
+    least : a smaller size is what any log has. ratio : whether the size is the logarithm of a factor.
+    scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
+    repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
+    equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
+    cost : what its free signs add to the misfit.
+    """
+
+    key: str
+    change: Callable[[Motion, Array], Motion]
+    trial: tuple[float, ...] = ()
+    unit: str = ""
+    least: float = 0.0
+    ratio: bool = False
+    scaled: tuple[int, ...] = ()
+    repair: str = ""
+    equals: tuple[str, ...] = ()
+    tells: str = ""
+    starts: tuple[float, ...] = ()
+    cost: float = 0.0
+
+    def sizes(self, theta: Array) -> tuple[float, ...]:
+        """Size in SI units of the numbers (k,) of the fit."""
+        return tuple((np.exp(theta) if self.ratio else theta).tolist())
+
+    def repair_text(self, theta: Array) -> str:
+        """The repair with the size in it."""
+        words = dict[str, float]()
+        for i, size in enumerate(self.sizes(theta)):
+            words |= {f"{{minus{i}}}": -size, f"{{over{i}}}": 1 / (size or np.inf), f"{{{i}}}": size}
+        text = self.repair
+        for word, value in words.items():
+            text = text.replace(word, f"{value:.4g}")
+        return text
+
+
+def list_causes(vessel: Vessel | None, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
+    """All causes that a vessel and a log can have."""
+    moving = [name for name in commands if np.ptp(motion.columns[name]) > 0]
+    return [
+        *(cause for name in moving for cause in _command_causes(name, motion.columns[name], scales)),
+        *_exchanged_thrusters(commands, motion),
+        *_sensor_causes(scales),
+        *_water_causes(motion, scales),
+        *(() if vessel is None else _coefficient_causes(vessel)),
+    ]
+
+
+def _subtract(name: str, motion: Motion, size: Array) -> Motion:
+    return motion.put({name: motion.columns[name] - size[0]})
+
+
+def _divide(names: Sequence[str], motion: Motion, size: Array) -> Motion:
+    return motion.put({name: motion.columns[name] * np.exp(-size[0]) for name in names})
+
+
+def _divide_astern(name: str, motion: Motion, size: Array) -> Motion:
+    values = motion.columns[name]
+    return motion.put({name: np.where(values < 0, values * np.exp(-size[0]), values)})
+
+
+def _negate(name: str, motion: Motion, _: Array) -> Motion:
+    return motion.put({name: -motion.columns[name]})
+
+
+def _advance(names: Sequence[str], motion: Motion, size: Array) -> Motion:
+    """The log with columns moved to the time that they belong to, `size` [s] before they were logged."""
+    moved = {name: np.array(motion.columns[name]) for name in names}
+    for values in moved.values():
+        for part in motion.stretches:
+            at = np.arange(part.stop - part.start, dtype=float)
+            values[part] = np.interp(at + size[0] / motion.step, at, values[part])
+    return motion.put(moved)
+
+
+def _exchange(pairs: Sequence[tuple[str, str]], motion: Motion, _: Array) -> Motion:
+    return motion.put({a: motion.columns[b] for pair in pairs for a, b in (pair, pair[::-1])})
+
+
+def _turn_heading(motion: Motion, size: Array) -> Motion:
+    """The heading less a bias, and velocities turned with it: those over ground stay."""
+    columns = motion.columns
+    turned = (columns["u"] + 1j * columns["v"]) * np.exp(1j * size[0])
+    return motion.put({"psi": columns["psi"] - size[0], "u": turned.real, "v": turned.imag})
+
+
+def _heading_from_course(motion: Motion, _: Array) -> Motion:
+    columns = motion.columns
+    return motion.put({"psi": columns["psi"] - np.arctan2(columns["v"], columns["u"])})
+
+
+def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
+    """The log of the origin, where it is of a point (x, y) [m] ahead and to starboard."""
+    columns, (x, y), moved = motion.columns, arm, dict[str, Array]()
+    if "position" in moves:
+        point = (x + 1j * y) * np.exp(1j * columns["psi"])
+        moved |= {"north": columns["north"] - point.real, "east": columns["east"] - point.imag}
+    if "velocity" in moves:
+        moved |= {"u": columns["u"] + y * columns["r"], "v": columns["v"] - x * columns["r"]}
+    return motion.put(moved)
+
+
+def _add_current(run: NDArray[np.intp], motion: Motion, size: Array) -> Motion:
+    """The log in the currents, north and then east of each [m/s], of which a step (N,) has number `run`."""
+    current = (size[: len(size) // 2] + 1j * size[len(size) // 2 :])[run]
+    return motion.put({"V_c": np.abs(current), "beta_c": np.angle(current)})
+
+
+def _add_drift(motion: Motion, size: Array) -> Motion:
+    """Velocities over ground in a current (north, east) [m/s], where they are logged through the water."""
+    body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
+    over = {"u": motion.columns["u"] + body.real, "v": motion.columns["v"] + body.imag}
+    return _add_current(np.zeros(len(body), dtype=np.intp), motion.put(over), size)
+
+
+def _add_drift_along(motion: Motion, size: Array) -> Motion:
+    """Velocities over ground in a current, where a speed through the water was resolved along the course."""
+    through = motion.columns["u"] + 1j * motion.columns["v"]
+    course = through / np.maximum(np.abs(through), 1e-9)
+    body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
+    over = through + course * (body * course.conj()).real
+    return _add_current(np.zeros(len(body), dtype=np.intp), motion.put({"u": over.real, "v": over.imag}), size)
+
+
+def _scale_numbers(where: NDArray[np.bool_], motion: Motion, size: Array) -> Motion:
+    return replace(motion, parameters=np.where(where, motion.parameters * np.exp(size[0]), motion.parameters))
+
+
+def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]:
+    size, angle, key = float(np.sqrt(np.mean(values**2))), is_steering(name), f"command {name}"
+    column, unit = f'[columns."{name}"]\n', "rad" if angle else "rev/s" if is_shaft(name) else ""
+    strength = ("coefficient rudder",) if angle else (f"{key} zero", "coefficient thrust", "coefficient damping")
+    yield Cause(
+        f"{key} zero", partial(_subtract, name), (0.05 * size,), unit, 0.003 if angle else 0.01 * size,
+        repair=f"{column}offset = {{minus0}}  # {unit}, added to what is there",
+        equals=("asymmetry of hull or screw",) if angle else (f"{key} scale", *strength[1:]),
+        tells="the angle read on a slip, and a run at another speed" if angle else SPEEDS,
+    )  # fmt: skip
+    yield Cause(
+        f"{key} scale", partial(_divide, [name]), (0.05,), "1", 0.02, ratio=True,
+        repair=f"{column}factor = {{over0}}  # times what is there", equals=strength, tells=BESIDE,
+    )  # fmt: skip
+    yield Cause(
+        f"{key} sign", partial(_negate, name), repair=f"{column}sign = -1  # times what is there",
+        equals=("mirror image of the motion",) if angle else (), tells="one turn whose side is known",
+    )  # fmt: skip
+    yield Cause(
+        f"{key} delay", partial(_advance, [name]), (max(0.05 * scales.passing, 0.25 * scales.interval),), "s",
+        max(1.01 * scales.interval, 0.03 * scales.passing), starts=tuple(scales.passing * share for share in LATE),
+        repair=f"{column}# move this column {{0}} s earlier", equals=("slower actuator", "sensors early"),
+        tells="a step of the command at rest, seen at the thruster",
+    )  # fmt: skip
+    if is_shaft(name) and (values < 0).any() and (values > 0).any():
+        yield Cause(
+            f"{key} scale astern", partial(_divide_astern, name), (0.05,), "1", 0.05, ratio=True,
+            repair=f"{column}# times {{over0}} where it is below 0",
+            equals=("coefficient thrust astern",), tells=BESIDE,
+        )  # fmt: skip
+
+
+def _exchanged_thrusters(commands: Sequence[str], motion: Motion) -> Iterator[Cause]:
+    signals: dict[str, list[str]] = {}
+    for name in commands:
+        signals.setdefault(name.rpartition(".")[0], []).append(signal_of(name))
+    for a, b in combinations(signals, 2):
+        pairs = [(f"{a}.{one}", f"{b}.{one}") for one in signals[a]]
+        if signals[a] == signals[b] and any((motion.columns[x] != motion.columns[y]).any() for x, y in pairs):
+            yield Cause(
+                f"exchange {a} {b}", partial(_exchange, pairs), repair=f"exchange the columns of {a} and {b}",
+                equals=("command sign of both",), tells="a run with one of the two alone",
+            )  # fmt: skip
+
+
+def _sensor_causes(scales: Scales) -> Iterator[Cause]:
+    size = {"u": scales.speed, "v": scales.speed, "r": 1 / scales.passing, "psi": 1.0}
+    unit = {"u": "m/s", "v": "m/s", "r": "rad/s", "psi": "rad"}
+    of_log, drift = ("sensor u scale", "sensor velocity scale", "sensor u bias"), ("velocity through water",)
+    bias = {"u": of_log + drift, "v": ("sensor psi bias", *drift), "r": ("sensor r scale",)}
+    bias["psi"] = ("positions in turned axes", "sensor v bias", "current", *drift)
+    for name, equals in bias.items():
+        yield Cause(
+            f"sensor {name} bias", partial(_subtract, name), (0.02 * size[name],), unit[name], 0.003 * size[name],
+            repair=f"[columns.{name}]\noffset = {{minus0}}  # {unit[name]}, added to what is there",
+            equals=equals, tells=f"{COURSES} and at several speeds",
+        )  # fmt: skip
+    yield Cause(
+        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.003,
+        repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
+        equals=("sensor v bias", "current"), tells=COURSES,
+    )  # fmt: skip
+    scaled: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
+        "u": (("u",), (0, 4)), "v": (("v",), (1,)), "r": (("r",), (2, 3)), "velocity": (VELOCITY, (0, 1, 4, 5))
+    }  # fmt: skip
+    same = {"u": of_log + drift, "velocity": of_log + drift, "r": ("sensor r bias",)}
+    for key, (names, rows) in scaled.items():
+        yield Cause(
+            f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.01, ratio=True, scaled=rows, starts=UNITS,
+            repair=f'[[repair]]\nkind = "scale"\ncolumns = {[*names]}\nfactor = {{over0}}',
+            equals=same.get(key, ()), tells=SPEEDS,
+        )  # fmt: skip
+    for name in ("v", "r", "psi"):
+        words = f"[columns.{name}]\nsign = -1  # times what is there"
+        yield Cause(f"sensor {name} sign", partial(_negate, name), repair=words)
+    of_velocity = ("sensor velocity delay",)
+    late: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
+        "u": (("u",), "velocity", of_velocity),
+        "v": (("v",), "velocity", of_velocity),
+        "r": (("r",), "yaw rate", ()),
+        "psi": (("psi",), "heading", ()),
+        "velocity": (VELOCITY, "velocity", ("sensor u delay", "sensor v delay")),
+        "position": (POSITION, "position", ("lever arm position",)),
+    }
+    for key, (names, kind, equals) in late.items():
+        yield Cause(
+            f"sensor {key} delay", partial(_advance, names), (max(0.03 * scales.passing, 0.25 * scales.interval),), "s",
+            0.01 * scales.passing, starts=tuple(share * scales.passing for share in (*EARLY, *LATE)),
+            repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
+            equals=equals, tells="turns to both sides",
+        )  # fmt: skip
+    yield Cause("heading is course", _heading_from_course, repair="name the column of a gyro or a compass as psi")
+    arms = {"position": ("lever arm velocity", "sensor position delay"), "velocity": ("lever arm position",)}
+    for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
+        yield Cause(
+            f"lever arm {moves}", partial(_move_to_origin, moves), 2 * (0.05 * scales.length,), "m",
+            0.02 * scales.length, repair=f'[[repair]]\nkind = "lever_arm"\nx = {{0}}\ny = {{1}}\nmoves = "{word}"',
+            equals=arms.get(moves, ()), tells="turns to both sides, and runs at another speed",
+        )  # fmt: skip
+
+
+def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
+    trial, least, count = 0.03 * scales.speed, 0.01 * scales.speed, max(motion.runs) + 1
+    run = np.repeat(motion.runs, [part.stop - part.start for part in motion.stretches])
+    drift = ("sensor psi bias", "sensor v bias", "wind that the log lacks")
+    equals = (*drift, "current", "current by run", "velocity through water")
+    yield Cause(
+        "current", partial(_add_current, 0 * run), 2 * (trial,), "m/s", least,
+        repair="--set current=one  # north {0}, east {1} m/s", equals=equals, tells=COURSES,
+    )  # fmt: skip
+    if count > 1:
+        yield Cause(
+            "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
+            repair='--set current="by run"', equals=equals, tells=COURSES,
+        )  # fmt: skip
+    yield Cause(
+        "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),
+        repair="u and v are through the water: take [estimate] in their place", tells=COURSES,
+    )  # fmt: skip
+    yield Cause(
+        "velocity through water / along the course", _add_drift_along, 2 * (trial,), "m/s", least, equals=equals,
+        repair="the speed is one through the water: take [estimate] in its place", tells=COURSES,
+    )  # fmt: skip
+    if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
+        yield Cause(
+            "wind scale", partial(_divide, ["V_w"]), (0.05,), "1", 0.05, ratio=True, equals=("coefficient wind",),
+            repair="[columns.V_w]\nfactor = {over0}  # times what is there", tells="the wind read at rest",
+        )  # fmt: skip
+        words = "[columns.beta_w]\noffset = {minus0}  # rad, added to what is there"
+        yield Cause("wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05, repair=words)
+
+
+def _coefficient_causes(vessel: Vessel) -> Iterator[Cause]:
+    names, shaft = list(vessel.parameters), "command scale of a shaft"
+    groups: dict[str, tuple[list[str], tuple[str, ...]]] = {
+        "damping": (
+            [path for path in names if path.startswith("hull.") and path.rpartition(".")[2] not in GEOMETRY],
+            ("coefficient thrust", "coefficient mass", shaft),
+        ),
+        "mass": (
+            [path for path in names if path in ("inertia.m", "inertia.I_z") or path.startswith("added_mass.")],
+            ("coefficient thrust", "coefficient damping"),
+        ),
+        "thrust": ([*filter(is_thrust, names)], ("coefficient damping", "coefficient mass", shaft)),
+        "rudder": ([*filter(_is_rudder_force, names)], ("command scale of an angle",)),
+    }
+    for group, (paths, equals) in groups.items():
+        if paths:
+            yield Cause(
+                f"coefficient {group}", partial(_scale_numbers, np.isin(names, paths)), (0.05,), "1", 0.03, ratio=True,
+                repair=f"--parameters {','.join(paths)}  # factor {{0}}", equals=equals,
+                tells=BESIDE if group == "rudder" else "runs that speed up and slow down",
+            )  # fmt: skip
+
+
+def _is_rudder_force(path: str) -> bool:
+    """Whether a parameter is one in which the force of a rudder is linear: a slope, or a derivative by its angle."""
+    name = path.rpartition(".")[2]
+    return path.startswith("thruster.") and ".actuator." not in path and (name == "f_alpha" or "delta" in name)

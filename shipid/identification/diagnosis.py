@@ -1,0 +1,584 @@
+"""What is wrong where a vessel and a log disagree: every cause is a nuisance of one fit, and all of them are compared.
+
+**The fit.** Equations of motion and of kinematics are multiplied by a bump phi(t) that moves along the runs, and
+integrated by parts (the weak form of `shipid.identification.inverse`): nothing is differentiated, nothing diverges.
+Each bump gives six residuals, measured change less predicted change: of u, v, r by the physics, of heading by the yaw
+rate, of position along and across by heading and velocities. A cause is a change of the log (commands, sensors), of
+the water or of the numbers of the vessel; it is fitted alone by Gauss-Newton from the same start.
+
+**Keys.** `command C zero`, `scale`, `sign`, `delay`, of a shaft also `scale astern` and `unsigned`;
+`exchange A B` (two thrusters); `sensor S bias` (u, v, r, psi), `scale` (u, v, r, velocity), `sign` (v, r, psi), `delay`
+(u, v, r, psi, velocity, position); `heading is course`; `lever arm position`, `lever arm position and velocity`,
+`lever arm velocity`; `current`, `current by run`, `velocity through water`; `wind scale`, `wind direction`;
+`coefficient damping`, `mass`, `thrust`, `rudder`; besides `none` and `cannot tell`.
+
+**Classes of equals**, which no or hardly any log tells apart (each with the run that would):
+
+- zero of an angle that steers, and an asymmetry of hull or screw;
+- scale of an angle, and the coefficient of the rudder; scale and zero of a shaft, and the coefficients of its thrust
+  and of the damping ahead, at few speeds;
+- delay of a command, a slower actuator, and all sensors early;
+- bias of psi, positions in turned axes, and on one course a current, velocity through water or bias of v;
+- bias and scale of u at one speed, velocity through water on one course, and scale of the velocity; bias and scale of r
+  at one rate of turn;
+- lever arm of the position ahead, and its delay, at one speed and without turns; without a vessel also that of the
+  velocity;
+- exchanged thrusters, and the sign of each where they are used against each other;
+- coefficient of mass, and of thrust and damping together; coefficients of thrust and damping at steady speed.
+
+**Judgement.** The misfit of a cause is the sum over the six equations of n ln(mean square + floor^2), n being bumps
+that do not overlap: it is free of scale, and an equation in which the vessel is poor weighs little. The floor is the
+white noise that the log itself shows, as it passes the bump, and `EXACT` of the size of the terms. A cause is
+estimated without a part of the runs (or of the time, where there is one run) and its misfit is taken on that part.
+
+The causes of least misfit also predict paths of 2.5 ship lengths, whose errors count as a seventh equation.
+
+- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or the
+  one that does lowers the error of the paths by less than a share `WORTH`; or that error is noise; or the cause is
+  smaller than what a log has anyhow (a command that is a row late).
+- The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
+  the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
+  and `equals` are the causes that remain.
+- A second cause is looked for in the same way once the log is repaired from the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.special import exprel
+
+from shipid.data.checks import white_noise_of
+from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
+from shipid.engine.casadi import memory_along
+from shipid.engine.rollout import rollout_distances
+from shipid.errors import DataError
+from shipid.identification.causes import Cause, Motion, Scales, list_causes
+from shipid.physics.signals import is_command, is_shaft, is_wrapped_angle
+from shipid.simulation.log import body_velocities, state_column
+from shipid.units import percent_text
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
+from shipid.vessel.load import Vessel
+
+Steps = NDArray[np.integer[Any]]
+NONE, UNCLEAR = "none", "cannot tell"
+LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
+MOST_PASSING = 200  # rows in which a ship of unknown length runs it, at most
+MOST_BUMPS = 400  # of a log: of a longer one parts are taken, evenly
+SMOOTH, NOISY = POINTS / 24, 0.03  # steps, of the smoothing before the forces; noise over signal from which it grows
+EXACT = 0.01  # of the size of the terms: what no resampled log says better
+AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
+FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
+ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
+MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
+PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics alone are judged
+MOST_SIZES = 2  # that a sentence names
+HUGE = 1e30  # residual where the physics fails
+FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
+SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
+SURE, APART = 2.0, 2.0  # standard errors
+DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
+WORTH = {"sensor": 0.2, "command": 0.25, "coefficient": 0.3}  # share of the error of the path; a poor vessel has some
+WORTH_OTHER, WORTH_DISCRETE = 0.2, 0.05  # of another cause; of one without a size, as a wrong sign
+CHANNELS = ("u", "v", "r", "psi", "along", "across")
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is wrong with a vessel and its log.
+
+    cause : key, `none` or `cannot tell`. equals : keys that the log does not tell from it.
+    size : of the cause in SI units, an empty tuple where it has none (a sign). interval : 95 %, (low, high) of each.
+    repair : lines for the mapping of the log, the vessel or the settings of an identification.
+    sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s] that it explains.
+    next : the same of a second cause beside the first, if there is one.
+    misfits : key -> misfit on parts left out, less that of `none`.
+    """
+
+    cause: str
+    equals: tuple[str, ...] = ()
+    size: tuple[float, ...] = ()
+    interval: tuple[tuple[float, float], ...] = ()
+    repair: str = ""
+    sentence: str = ""
+    share: float = 0.0
+    error: float = 0.0
+    ahead: float = 0.0
+    next: Diagnosis | None = None
+    misfits: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it."""
+
+    cause: Cause
+    theta: Array
+    errors: Array
+    left_out: Array
+    motion: Motion
+
+
+class _Log:
+    """A log at equal steps with its bumps, and the residuals of any change of it by kinematics alone."""
+
+    length: float | None = None
+    plain = PLAIN
+    commands: tuple[str, ...] = ()
+    environment: tuple[str, ...] = ()
+    numbers: tuple[float, ...] = ()
+
+    def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
+        stretches = [(run, rows) for run, rows in stretch_columns(dataset) if run in runs]
+        every = {name: np.concatenate([rows[name] for _, rows in stretches]) for name in ("u", "v", "r")}
+        speed = float(np.sqrt(np.mean(every["u"] ** 2 + every["v"] ** 2)))
+        rate = float(np.sqrt(np.mean(every["r"] ** 2)))
+        usual = float(np.median(np.concatenate([np.diff(rows["t"]) for _, rows in stretches])))
+        longest = max(float(np.ptp(rows["t"])) for _, rows in stretches)
+        length = self.length or max(speed / max(rate, speed / MOST_PASSING / usual, 1e-12), 1e-3)
+        self.scales = Scales(length, max(speed, 1e-6 * length / usual), usual)
+        self.width = max(min(LENGTHS * self.scales.passing, longest / 4), 8 * usual)
+        self.step = self.width / POINTS
+        self.motion = self._resample(runs, stretches)
+        self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
+        self.noise = self._noise(stretches, usual)
+
+    def repair(self, motion: Motion) -> None:
+        """Take another motion for the log."""
+        self.motion = motion
+
+    def causes(self) -> list[Cause]:
+        """What may be wrong with the log."""
+        return [one for one in list_causes(None, (), self.motion, self.scales) if not one.key.startswith("current")]
+
+    def forces(self, motion: Motion) -> Array:
+        """Mean accelerations (3, W) over the bumps, such as they are: no physics says others."""
+        return np.array([motion.columns[name][self.bumps] @ self.pull for name in ("u", "v", "r")])
+
+    def path_errors(self, motion: Motion) -> Array:
+        """Mean error (K,) [m] of each path over 2.5 ship lengths by dead reckoning with u, v, r."""
+        columns, rows = self.states(motion), self.paths + np.arange(AHEAD + 1)[:, None]
+        u, v, r = (columns[name][rows] for name in ("u", "v", "r"))
+
+        def travelled(rate: NDArray[Any]) -> NDArray[Any]:
+            return self.step * np.cumsum((rate[1:] + rate[:-1]) / 2, axis=0)
+
+        heading = columns["psi"][rows[0]] + np.concatenate([0 * r[:1], travelled(r)])
+        place = columns["north"][rows] + 1j * columns["east"][rows]
+        return np.asarray(np.abs(place[1:] - place[0] - travelled((u + 1j * v) * np.exp(1j * heading))).mean(axis=0))
+
+    def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
+        parts: list[dict[str, Array]] = []
+        places: list[int] = []
+        for run, rows in stretches:
+            t = np.asarray(rows["t"], dtype=float)
+            count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
+            if count > AHEAD and len(t) > 8:
+                grid = t[0] + self.step * np.arange(count)
+                names = [name for name in rows if name not in ("run", "t", "flags")]
+                parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
+                places.append(list(runs).index(run))
+        if not parts:
+            raise DataError(
+                f"no stretch is longer than {self.width:.3g} s, in which the ship runs {LENGTHS:g} lengths", path="runs"
+            )
+        shared = set.intersection(*(set(part) for part in parts))
+        ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
+        zero = np.zeros(int(ends[-1]))
+        columns |= {name: zero for name in self.environment if name not in columns}
+        slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
+
+    def _cut(self, duration: float) -> None:
+        """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
+        begins, blocks, folds = list[Steps](), list[Steps](), list[Steps]()
+        first = 0
+        several = len(set(self.motion.runs)) >= FOLDS
+        every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
+        for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
+            here = np.arange(part.start, part.stop - POINTS - 1, every)
+            number = np.arange(len(here)) // BLOCK
+            begins.append(here)
+            blocks.append(number + first)
+            first += int(number.max(initial=-1)) + 1
+            folds.append(np.full(len(here), run % FOLDS) if several else number % FOLDS)
+        begin = np.concatenate(begins)
+        self.bumps = begin[:, None] + np.arange(POINTS + 1)
+        self.block, self.fold = np.concatenate(blocks), np.concatenate(folds)
+        self.paths = np.concatenate(
+            [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
+        ).astype(int)
+        self.path_block = self.block[np.clip(np.searchsorted(begin, self.paths), 0, len(begin) - 1)]
+        s = np.linspace(-1, 1, POINTS + 1)
+        phi, slope = (1 - s**2) ** 3, -s * (1 - s**2) ** 2
+        self.phi, t = phi / phi.sum(), self.step * np.arange(POINTS + 1)
+        slope = slope - slope.mean()
+        self.pull = slope / (slope @ t)
+        self.worth = len(begin) * STRIDE / POINTS if every == STRIDE else float(len(begin))
+        psi = self.motion.columns["psi"][self.bumps[:, POINTS // 2]]
+        self.turn = np.exp(-1j * psi)
+        self.used: Steps = np.unique(self.bumps)
+        self.place = np.searchsorted(self.used, self.bumps)
+
+    def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
+        """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
+        share = min(usual / self.step, 1.0) ** 0.5
+
+        def white(name: str) -> float:
+            values = [np.unwrap(rows[name]) if name == "psi" else rows[name] for _, rows in stretches]
+            return float(share * np.median([white_noise_of(np.asarray(one, dtype=float)) for one in values]))
+
+        sizes = {name: float(np.sqrt(np.mean(self.motion.columns[name] ** 2))) for name in ("u", "v", "r")}
+        rough = max(white(name) / max(size, 1e-12) for name, size in sizes.items())
+        self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
+        pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
+        speed, passing = self.scales.speed, self.scales.passing
+        terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
+        velocity = [pulled * white(name) for name in ("u", "v", "r")]
+        place = pulled * max(white("north"), white("east"))
+        heading = summed * speed * white("psi")
+        self.blur = float(np.hypot(max(white("north"), white("east")), 0.1 * EXACT * self.scales.length))
+        turning = np.hypot(pulled * white("psi"), summed * white("r"))
+        along, across = (np.hypot(place, summed * white(name)) for name in ("u", "v"))
+        noise = [*velocity, turning, along, np.hypot(across, heading)]
+        return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
+
+    def states(self, motion: Motion) -> dict[str, Array]:
+        """Columns of the states, those of motion smoothed."""
+        columns = dict(motion.columns)
+        for name in ("u", "v", "r", "psi"):
+            values = np.array(columns[name])
+            for part in motion.stretches:
+                values[part] = gaussian_filter1d(columns[name][part], self.smooth, mode="nearest")
+            columns[name] = values
+        return columns | dict(body_velocities(columns))
+
+    def residuals(self, motion: Motion) -> Array:
+        """Residuals (6, W): measured change less predicted change, a unit of time."""
+        columns, bumps = motion.columns, self.bumps
+        forces = self.forces(motion)
+        changes = [columns[name][bumps] @ self.pull for name in ("u", "v", "r", "psi", "north", "east")]
+        velocity = (columns["u"] + 1j * columns["v"]) * np.exp(1j * columns["psi"])
+        path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
+        turning = changes[3] - columns["r"][bumps] @ self.phi
+        every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
+        return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
+
+    def estimate(self, cause: Cause, rounds: int = ROUNDS) -> _Fit:
+        """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
+        trials = np.array(cause.trial)
+
+        def change(theta: Array) -> tuple[Motion, Array]:
+            motion = cause.change(self.motion, theta)
+            z = self.residuals(motion)
+            if cause.scaled:
+                z[list(cause.scaled)] *= np.exp(theta[0])
+            return motion, z
+
+        begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
+        theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
+        J = np.zeros((len(theta), *z.shape))
+        for _ in range(rounds if len(theta) else 0):
+            J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
+            step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
+            if cause.ratio and not cause.scaled:
+                step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta)
+            before = self.misfit(z)
+            for _ in range(HALVINGS):
+                after, moved = change(theta + step)
+                if self.misfit(moved) < before:
+                    break
+                step = step / 2
+            else:
+                break
+            theta, motion, z = theta + step, after, moved
+            if (np.abs(step) < SETTLED * np.abs(trials)).all():
+                break
+        left = z.copy()
+        for fold in range(FOLDS) if len(theta) else ():
+            out = self.fold == fold
+            if out.any() and not out.all():
+                step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
+                left[:, out] += np.tensordot(step, J[:, :, out], 1)
+        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
+
+    def weights(self, z: Array) -> Array:
+        """Inverse of the level (6,) of residuals."""
+        return np.asarray(1 / np.sqrt((z**2).mean(axis=1) + self.noise**2))
+
+    def _step(self, J: Array, z: Array, kept: NDArray[np.bool_]) -> Array:
+        weight = self.weights(z[:, kept])[:, None]
+        A = (J[:, :, kept] * weight).reshape(len(J), -1).T
+        size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+        return np.asarray(-np.linalg.lstsq(A / size, (z[:, kept] * weight).ravel(), rcond=1e-6)[0] / size)
+
+    def _covariance(self, J: Array, z: Array) -> Array:
+        """Covariance (k, k) by blocks of bumps (sandwich)."""
+        weight = self.weights(z)[:, None]
+        A, e = J * weight, z * weight
+        bread = np.linalg.pinv(np.einsum("icw,jcw->ij", A, A), rcond=1e-12)
+        of_block = self.block[:, None] == np.arange(int(self.block.max()) + 1)
+        score = bread @ np.einsum("icw,cw->iw", A, e) @ of_block
+        covariance: Array = score @ score.T
+        return covariance
+
+    def misfit(self, z: Array) -> float:
+        """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
+        return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
+
+    def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
+        """By how much one misfit is lower than another, and the standard error over blocks of time.
+
+        worse, better : residuals (6, W), errors of paths (K,).
+        """
+        sums, floors = np.zeros(int(self.block.max()) + 1), (self.noise[:, None], self.blur)
+        for i, (block, weight) in enumerate(((self.block, self.worth / 2), (self.path_block, self.worth))):
+            a, b = (np.atleast_2d(z[i] ** 2 + floors[i] ** 2) for z in (worse, better))
+            off = np.log(a.mean(axis=1) / b.mean(axis=1))
+            level = b.mean(axis=1) * exprel(off)  # the logarithmic mean of both
+            each = ((a - b) / level[:, None]).sum(axis=0) * weight / a.shape[1]
+            sums += np.bincount(block, each, len(sums))
+        return float(sums.sum()), float(np.std(sums) * np.sqrt(len(sums))) + 1e-9
+
+
+class _VesselLog(_Log):
+    """A log with the vessel that should have made it."""
+
+    plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
+
+    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
+        if "current" not in vessel.document:
+            vessel = vessel.with_values({"current.kind": "uniform"})
+        self.vessel, self.model = vessel, vessel_dynamics(vessel)
+        self.length, self.commands, self.environment = vessel.length, self.model.commands, self.model.environment
+        self.numbers = tuple(vessel.parameters.values())
+        missing = next((name for name in self.commands if name not in dataset.commands), None)
+        if missing is not None:
+            raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
+        super().__init__(dataset, runs)
+        self.repair(self.motion)
+
+    def repair(self, motion: Motion) -> None:
+        """Take another motion for the log, whose actuators and forces are kept."""
+        self.motion, self._kept = motion, None
+        memory = self.memory(motion)
+        self._kept = memory, np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+
+    def causes(self) -> list[Cause]:
+        """What may be wrong with the log or with the vessel."""
+        return [*list_causes(self.vessel, self.commands, self.motion, self.scales), *_unsigned_shafts(self)]
+
+    def memory(self, motion: Motion) -> Array:
+        """Actuator states (M, N) that the orders of a log reach."""
+        orders = {name: motion.columns[name] for name in self.commands}
+        if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
+            return self._kept[0]
+        result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
+        for part in motion.stretches if self.model.memory else ():
+            given = {name: values[part] for name, values in orders.items()}
+            reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
+            result[:, part] = np.array([reached[name] for name in self.model.memory])
+        return result
+
+    def forces(self, motion: Motion) -> Array:
+        """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
+        names = ["u", "v", "r", *self.commands, *self.environment]
+        names += ["psi"] if any(motion.columns[name].any() for name in self.environment) else []
+        same = self._kept is not None and motion.parameters is self.motion.parameters
+        if self._kept is not None and same and all(motion.columns[name] is self.motion.columns[name] for name in names):
+            return self._kept[1]
+        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+
+    def accelerations(self, motion: Motion, at: Steps) -> Array:
+        """Accelerations (3, n) of u, v, r by the physics at n steps."""
+        columns = self.states(motion)
+        inputs = [self._start(columns, at), self.memory(motion)[:, at]]
+        inputs += [
+            np.array([columns[name][at] for name in names]).reshape(-1, len(at))
+            for names in (self.commands, self.environment)
+        ]
+        return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
+
+    def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
+        """States (., n) at n steps; those that no column has are 0."""
+        names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
+        return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
+
+    def path_errors(self, motion: Motion) -> Array:
+        """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
+        columns, at = self.states(motion), self.paths
+        rows = at + np.arange(AHEAD + 1)[:, None]
+        found = rollout_distances(
+            self.vessel,
+            dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
+            {name: columns[name][rows[:-1]] for name in self.commands},
+            {name: columns[name][rows[:-1]] for name in self.environment},
+            np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1),
+            step=self.step,
+            method="rk4",
+            parameters=motion.parameters[None],
+            memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
+        )
+        far = LOST * self.scales.length
+        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / AHEAD, far)))
+
+
+def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
+    """A column at equal steps: an order holds from its row on; motion is averaged over a step, or goes on smoothly."""
+    if is_command(name):
+        last = np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
+        return np.asarray(values[np.clip(last, 0, len(t) - 1)])
+    values = np.unwrap(values) if is_wrapped_angle(name) else values
+    step = grid[1] - grid[0]
+    if np.median(np.diff(t)) > 0.7 * step:
+        return np.asarray(CubicSpline(t, values)(grid))
+    total = cumulative_integral(t, values)
+    low, high = (np.clip(grid + side * step / 2, t[0], t[-1]) for side in (-1, 1))
+    return np.asarray((np.interp(high, t, total) - np.interp(low, t, total)) / (high - low))
+
+
+@lru_cache(maxsize=16)
+def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
+    """(state, memory, commands, environment, parameters) -> accelerations of u, v, r, at `count` instants."""
+    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
+    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
+    parameters, total = ca.SX.sym("parameters", len(model.parameters)), ca.SX(model.num_dof, 1)
+    for term in model.sums:
+        for entry in () if term.arrays is None else term.arrays:
+            total = total + term.function(*inputs, parameters, entry)
+    rates = model.rates(*inputs, parameters, total)
+    rows = [model.state.index(name) for name in ("u", "v", "r")]
+    return ca.Function("accelerations", [*inputs, parameters], [rates[rows]], {"cse": True}).map(
+        "mapped", "serial", count, [4], []
+    )
+
+
+def _likeliest_signs(astern: Array) -> Array:
+    """Signs (N,) of least misfit, where each change of the sign costs `SIGN` (Viterbi).
+
+    astern : (N,) by how much less the misfit is with -1.
+    """
+    cost, came = np.zeros(2), np.zeros((len(astern), 2), dtype=int)
+    for i, less in enumerate(astern):
+        came[i] = [int(cost[1] + SIGN < cost[0]), int(cost[1] <= cost[0] + SIGN)]
+        cost = np.minimum(cost, cost[::-1] + SIGN) - [0.0, less]
+    state, signs = int(np.argmin(cost)), np.ones(len(astern))
+    for i in range(len(astern) - 1, -1, -1):
+        signs[i] -= 2 * state
+        state = came[i, state]
+    return signs
+
+
+def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
+    return motion.put({name: signs * motion.columns[name] for name in names})
+
+
+def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
+    """Shafts whose speed may lack its sign, each alone and all together.
+
+    They turn astern where u and r change as they do under shafts that turn astern.
+    """
+    motion, every = log.motion, np.arange(len(log.motion.columns["u"]))
+    smooth, measured = log.states(motion), np.zeros((2, len(every)))
+    for part in motion.stretches:
+        rates = (np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r"))
+        measured[:, part] = list(rates)
+    shafts = [name for name in filter(is_shaft, log.commands) if motion.columns[name].min() >= 0]
+    shafts = [name for name in shafts if np.ptp(motion.columns[name]) > 0]
+    for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
+        ahead, astern = (
+            (measured - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2 for sign in (1, -1)
+        )
+        signs = np.ones(len(every))
+        for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
+            level = 1 / log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2], None]
+            signs = _likeliest_signs(((ahead - astern) / level**2).sum(axis=0) / POINTS)
+        if (signs < 0).any():
+            together = f" / with {' '.join(names[1:])}" * (len(names) > 1)
+            yield Cause(
+                f"command {names[0]} unsigned{together}",
+                partial(_put_signs, names, signs),
+                repair=f"{' and '.join(names)} without a sign: give the column that says ahead or astern",
+                equals=tuple(f"command {name} unsigned" for name in shafts),
+                tells="the column that says ahead or astern",
+                cost=float((np.diff(signs) != 0).sum()),
+            )
+
+
+def diagnose(vessel: Vessel | None, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
+    """Find what is wrong with a vessel and a log of it, or with a log alone; runs : names, default: all.
+
+    Raises DataError where a command is missing, or no stretch is long enough.
+    """
+    names = list(dataset.runs if runs is None else runs)
+    log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names)
+    causes = log.causes()
+    first, cause = _judge(log, causes)
+    if cause is None:
+        return first
+    log.repair(log.estimate(cause).motion)
+    second = _judge(log, [one for one in causes if one.key != cause.key])[0]
+    both = f"{first.sentence}; without that, {second.sentence}"
+    return replace(first, sentence=both, next=second)
+
+
+def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]:
+    """The best of all causes as a diagnosis, and the cause where it is named."""
+    base = log.residuals(log.motion)
+    first = {cause.key: log.estimate(cause, 1) for cause in causes}
+    near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
+    fits = first | {key: log.estimate(first[key].cause) for key in near}
+    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
+    order = sorted(misfits, key=misfits.__getitem__)
+    plain = base, log.path_errors(log.motion)
+    seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
+    misfits |= {key: fits[key].cause.cost - log.gain(plain, one)[0] for key, one in seen.items()}
+    order = sorted(seen, key=misfits.__getitem__)
+    best = fits[order[0]]
+    cause, theta = best.cause, best.theta
+    gain, error = log.gain(plain, seen[order[0]])
+    share = 1 - float(seen[order[0]][1].mean() / max(plain[1].mean(), log.blur))
+    ahead, missed = log.step * AHEAD, float(plain[1].mean())
+    how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average"
+    result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
+    result = replace(result, sentence=f"{how_far}, and no single cause explains that")
+    least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
+    shown = (
+        gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
+    )
+    if missed < log.blur or not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
+        return result, None
+    behind = {key: log.gain(seen[key], seen[order[0]]) for key in order[1:]}
+    tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
+    near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
+    name = cause.key.partition(" / ")[0]
+    if set(near) - {name, *cause.equals}:
+        alike = (name, *(key for key in near if key != name))
+        sentence = f"{how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
+        return replace(result, cause=UNCLEAR, equals=alike, sentence=_with_remedy(sentence, cause.tells)), None
+    ends = (cause.sizes(theta - 1.96 * best.errors), cause.sizes(theta + 1.96 * best.errors))
+    unfitted = [key for key in cause.equals if key not in fits]
+    equals = tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name)
+    interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
+    sizes, repair = cause.sizes(theta), cause.repair_text(theta)
+    words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
+    sentence = f"{name}{' = ' * bool(words)}{', '.join(words)}{' ' * (len(cause.unit) > 1)}{cause.unit.strip('1')}"
+    sentence = f"{how_far}: {sentence} explains {percent_text(share)} of that; {' '.join(repair.split())}"
+    sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
+    return replace(
+        result, cause=name, equals=equals, size=sizes, interval=interval, repair=repair, sentence=sentence
+    ), cause
+
+
+def _with_remedy(sentence: str, tells: str) -> str:
+    return f"{sentence}: to tell them apart, {tells}" if tells else sentence

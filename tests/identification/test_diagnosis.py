@@ -1,0 +1,107 @@
+"""Laws of a diagnosis: a fault is named with its size and its repair, a sound log is not blamed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError
+from shipid.identification.diagnosis import NONE, UNCLEAR, diagnose
+from shipid.vessel.load import load_vessel
+from tests.identification.trials import changed, noisy, trials
+
+SHIP = load_vessel("gunnerus-28.9")
+NOISE = {"u": 0.02, "v": 0.02, "r": 1e-3, "psi": 2e-3, "north": 0.1, "east": 0.1}
+Frame = pd.DataFrame
+
+
+def log_of(seed: int) -> Dataset:
+    """Six runs of a minute and a half with the noise of sensors."""
+    return noisy(trials(SHIP, steps=90, seed=seed, step=1.0), NOISE, seed)
+
+
+def moved(f: Frame, x: float, velocity: bool) -> dict[str, np.ndarray]:
+    place = {"north": f["north"] + x * np.cos(f["psi"]), "east": f["east"] + x * np.sin(f["psi"])}
+    return place | ({"v": f["v"] + x * f["r"]} if velocity else {})
+
+
+def sides(f: Frame) -> dict[str, np.ndarray]:
+    pairs = [("port.n", "starboard.n"), ("port.alpha", "starboard.alpha")]
+    return {a: f[b] for pair in pairs for a, b in (pair, pair[::-1])}
+
+
+FAULTS: dict[str, tuple[Callable[[Frame], dict[str, np.ndarray]], float | None]] = {
+    "sensor psi bias": (lambda f: {"psi": f["psi"] + 0.08}, 0.08),
+    "sensor r bias": (lambda f: {"r": f["r"] + 0.02}, 0.02),
+    "sensor u scale": (lambda f: {"u": 1.1 * f["u"]}, 1.1),
+    "sensor v sign": (lambda f: {"v": -f["v"]}, None),
+    "lever arm position and velocity": (lambda f: moved(f, 9.0, True), 9.0),
+    "lever arm position": (lambda f: moved(f, 9.0, False), 9.0),
+    "command port.alpha zero": (lambda f: {"port.alpha": f["port.alpha"] + 0.2}, 0.2),
+    "command port.alpha sign": (lambda f: {"port.alpha": -f["port.alpha"]}, None),
+    "command starboard.n scale": (lambda f: {"starboard.n": 1.4 * f["starboard.n"]}, 1.4),
+}
+
+
+@pytest.mark.parametrize("key", FAULTS)
+def test_a_fault_is_named_with_its_size(key: str) -> None:
+    log = log_of(1)
+    fault, size = FAULTS[key]
+    found = diagnose(SHIP, changed(log, **{name: np.asarray(x) for name, x in fault(log.frame).items()}))
+    assert key in (found.cause, *found.equals)
+    assert found.cause != UNCLEAR
+    assert found.cause in found.sentence
+    if size is not None and found.cause == key:
+        assert found.size[0] == pytest.approx(size, rel=0.15)
+        assert found.interval[0][0] <= found.size[0] <= found.interval[0][1]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_sound_log_is_not_blamed(seed: int) -> None:
+    found = diagnose(SHIP, log_of(seed))
+    assert found.cause == NONE
+    assert "no single cause" in found.sentence
+
+
+@pytest.mark.parametrize("key", ["sensor psi bias", "sensor r bias", "lever arm position"])
+def test_kinematics_alone_name_what_needs_no_vessel(key: str) -> None:
+    log = log_of(2)
+    spoilt = changed(log, **{name: np.asarray(x) for name, x in FAULTS[key][0](log.frame).items()})
+    found = diagnose(None, spoilt)
+    assert key in (found.cause, *found.equals)
+    assert diagnose(None, log).cause == NONE
+
+
+def test_coefficients_are_named_as_a_class() -> None:
+    """Of a vessel whose damping is half of the truth no sensor is blamed."""
+    hull = {path: 0.5 * x for path, x in SHIP.parameters.items() if path.startswith("hull.derivatives")}
+    assert diagnose(SHIP.with_values(hull), log_of(1)).cause.startswith(("coefficient", UNCLEAR))
+
+
+def test_a_shaft_without_its_sign_is_named() -> None:
+    craft = load_vessel("otter")
+    random, log = np.random.default_rng(3), trials(craft, runs=4, steps=200, seed=3, step=0.25)
+    orders = np.repeat(random.uniform(-8, 12, (4, 6)), 40, axis=1)[:, :201].T
+    signed = trials(craft, runs=4, steps=200, seed=3, step=0.25, true_commands=dict.fromkeys(log.commands, orders))
+    spoilt = changed(signed, **{name: np.abs(orders).T.ravel() for name in log.commands})
+    found = diagnose(craft, spoilt)
+    assert found.cause in ("command port.n unsigned", "command starboard.n unsigned")
+
+
+def test_a_ship_at_rest_is_not_blamed() -> None:
+    log = log_of(1)
+    still = dict.fromkeys((*log.commands, "u", "v", "r", "north", "east"), 0.0)
+    for vessel in (SHIP, None):
+        assert diagnose(vessel, Dataset(log.frame.assign(psi=0.3, **still), log.metadata)).cause == NONE
+
+
+def test_runs_too_short_for_a_bump_are_refused() -> None:
+    log = log_of(1)
+    with pytest.raises(DataError, match="no stretch is longer than"):
+        diagnose(SHIP, Dataset(log.frame.groupby("run").head(8), log.metadata))
+    with pytest.raises(DataError, match="needs this command"):
+        diagnose(load_vessel("mariner"), log)
