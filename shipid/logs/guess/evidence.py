@@ -125,26 +125,6 @@ def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.
     return np.interp(index, index[known], np.unwrap(values[known], period=turn)), false
 
 
-def lever_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
-    """The arm x + i y [m] from the point of velocities to that of positions, its standard error, its share of misfit.
-
-    Least squares of seen - integrated = (x + i y) (exp(i psi) at the end - at the start).
-    """
-    power = float(np.sum(np.abs(turned) ** 2))
-    if power < 1e-3 * len(turned):
-        return 0j, np.inf, 0.0
-    parts = np.array_split(np.arange(len(seen)), 10)
-    whole = np.vdot(turned, seen - integrated) / power
-    shifts = [
-        np.vdot(turned[part], (seen - integrated)[part]) / np.sum(np.abs(turned[part]) ** 2)
-        for part in parts
-        if np.sum(np.abs(turned[part]) ** 2) > 0.02 * power / 10
-    ]
-    error = 1.25 * float(np.std(shifts)) / np.sqrt(len(shifts)) if len(shifts) > 3 else np.inf
-    explained = abs(whole) ** 2 * power / max(float(np.sum(np.abs(seen - integrated) ** 2)), 1e-30)
-    return complex(whole), error, float(explained)
-
-
 def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
     """The t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
 

@@ -18,7 +18,7 @@ from shipid.logs.guess.search import (
     WAYS,
     Axes,
     Frame,
-    Motion,
+    MotionReading,
     Sense,
     Velocity,
     length_unit,
@@ -57,7 +57,7 @@ def choose_motion(state: State, file: Path, frame: Frame | None = None) -> None:
 # --- position and heading ---
 
 
-def _take_pose(state: State, best: Motion) -> None:
+def _take_pose(state: State, best: MotionReading) -> None:
     pose, axes = best.pose, best.axes
     place, sense = pose.place, best.axes.sense(pose.sense)
     plane = axes.place(local_plane(state, place.first, place.second, place.on_globe))
@@ -94,7 +94,7 @@ def _take_pose(state: State, best: Motion) -> None:
     state.psi = sense.direction(angle * to_si(pose.unit, "psi"))
 
 
-def _report_axes(state: State, best: Motion, sources: tuple[str, str], sense: Sense) -> None:
+def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], sense: Sense) -> None:
     """Note axes and a heading that count otherwise than usual, and ask where another reading is nearly as likely."""
     pose, axes = best.pose, best.axes
     agreement = 1.0 - pose.misfit
@@ -121,7 +121,7 @@ def _report_axes(state: State, best: Motion, sources: tuple[str, str], sense: Se
     elif best.rivals:
         sides = "; port and starboard change places" * any(axes.hand != one.hand for one in best.rivals)
         said = ", or ".join([f"is {words}", *(_reading_in_words(best, one) for one in best.rivals)])
-        words = f"{said}? Motion is the same in all{sides}: answer with --frame ned, enu, zup or ros"
+        words = f"{said}? MotionReading is the same in all{sides}: answer with --frame ned, enu, zup or ros"
         state.ask(("psi", "north", "east"), words)
 
 
@@ -131,14 +131,14 @@ def _ways(axes: Axes) -> list[str]:
     return ways[::-1] if axes.swap else ways
 
 
-def _reading_in_words(best: Motion, axes: Axes) -> str:
+def _reading_in_words(best: MotionReading, axes: Axes) -> str:
     place, sense, ways = best.pose.place, axes.sense(best.pose.sense), _ways(axes)
     side = "starboard" if sense.sign > 0 else "port"
     counts = f"{best.pose.heading!r} counted to {side} from {WAYS[sense.quarter % 4]}"
     return f"{place.first!r} to {ways[0]}, {place.second!r} to {ways[1]}, {counts}"
 
 
-def _ask_about_names(state: State, best: Motion) -> None:
+def _ask_about_names(state: State, best: MotionReading) -> None:
     """Ask about what names say of position and heading: a magnetic compass, set points, ship lengths, no agreement."""
     pose = best.pose
     first, second = pose.place.first, pose.place.second
@@ -158,7 +158,7 @@ def _ask_about_names(state: State, best: Motion) -> None:
         state.ask(("psi", "north", "east", "latitude", "longitude"), words)
 
 
-def _ask_about_rivals(state: State, motions: list[Motion]) -> None:
+def _ask_about_rivals(state: State, motions: list[MotionReading]) -> None:
     """Ask where another column may be the heading nearly as well, and where a second heading differs from the first."""
     best, heading = motions[0], motions[0].pose.heading
     found = best.velocity
@@ -186,7 +186,7 @@ def _ask_about_rivals(state: State, motions: list[Motion]) -> None:
 # --- velocities ---
 
 
-def _take_velocities(state: State, best: Motion, found: Velocity) -> None:
+def _take_velocities(state: State, best: MotionReading, found: Velocity) -> None:
     axes, fit = best.axes, found.fit
     first, second = found.first, found.second
     sources = (first,) if found.kind == "course" else (first, second)
@@ -220,7 +220,7 @@ def _take_velocities(state: State, best: Motion, found: Velocity) -> None:
     _report_factor(state, fit, sources, unit, ("speed",) if found.kind == "course" else ("u", "v"))
 
 
-def _suggest_two(state: State, best: Motion, found: Velocity, unit: str, confidence: float, why: str) -> None:
+def _suggest_two(state: State, best: MotionReading, found: Velocity, unit: str, confidence: float, why: str) -> None:
     """Suggest two columns as u and v: of the axes of the log, or of the ship."""
     first, second, axes = found.first, found.second, best.axes
     if found.kind == "earth":
@@ -320,7 +320,7 @@ def _as_track(state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...
 # --- yaw rate and clock ---
 
 
-def _take_rate(state: State, best: Motion) -> None:
+def _take_rate(state: State, best: MotionReading) -> None:
     found, called = best.rate, state.all_called("r")
     if found is None:
         free = [name for name in called if name in state.free()]

@@ -159,7 +159,7 @@ class Rate:
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionReading:
     """A hypothesis of the whole motion, with where its axes point, and where nearly as likely."""
 
     pose: Pose
@@ -174,7 +174,7 @@ class Motion:
 # --- hypotheses ---
 
 
-def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[Motion]:
+def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[MotionReading]:
     """The hypotheses of the motion, the likeliest first; `state.chosen` is then for the turns of this ship.
 
     Raises DataError if no column can be the position or the heading, or if the ship does not move as in that frame.
@@ -326,7 +326,7 @@ def _as_astern(state: State, pose: Pose) -> Pose:
     return replace(pose, sense=sense, astern=True, cost=pose.cost + (1.0 if back else SETTINGS.compass + 1.0))
 
 
-def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> Motion | None:
+def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> MotionReading | None:
     """The motion with this pose; None where it cannot be in the frame."""
     place = pose.place
     plane = local_plane(state, place.first, place.second, place.on_globe)
@@ -346,7 +346,7 @@ def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> Motion | Non
     (cost, axes, settled), *others = readings
     total = pose.cost + cost + sum(one.cost for one in (velocity, rate) if one is not None and one.cost < 0.0)
     rivals = tuple(other for more, other, _ in others if more < cost + SETTINGS.close)
-    return Motion(pose, velocity, rate, axes, total, settled, rivals)
+    return MotionReading(pose, velocity, rate, axes, total, settled, rivals)
 
 
 # --- where the axes point ---
