@@ -148,7 +148,7 @@ def test_a_log_that_fails_its_checks_is_named_before_the_vessel(tmp_path: Path) 
     """Knots taken for m/s are named with their factor. And 99 kn in one row: physics diverges there."""
     draft, document = drafted(tmp_path, trial(u=3600 / 1852))
     assert document["data"]["path"] == "position"
-    assert "sensor velocity scale = 1.94" in draft.warnings[-1]
+    assert "sensor u scale = 1.94" in draft.warnings[-1]
     assert "factor = 0.5144" in draft.warnings[-1]
     dataset = trial()
     spoilt = dataset.frame["u"].where(dataset.frame["t"] != dataset.frame["t"].iloc[40], 51.0)
