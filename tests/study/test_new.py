@@ -114,6 +114,8 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
     assert [one.name for one in plan.foundations] == [SHIP, "inaccurate", "none"]
     prepared = prepare(plan, obtain_runs(plan))
     assert len(prepared.pool.spans) == plan.study.grid.N_D[-1] == 7
+    assert len(prepared.folds(plan.batches[0], prepared.pool, "runs")) == 7  # every run is left out in its turn
+    assert [way.kind for way in plan.methods] == ["kernel"]
     assert document["split"]["test"] == ["zz 3"] or document["split"]["test"] == ["zz 4"]
     assert document["prediction"]["ahead"] == 19  # 2.5 x 33.9 m / 4.35 m/s
     assert "zigzag 8" in document["description"]
