@@ -77,8 +77,8 @@ class Controls:
             what = ": a manoeuvre needs that of a rudder or an azimuth unit"
             if self.differential:
                 what = (
-                    ", it steers by its shafts: the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each "
-                    f"one ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
+                    ", it steers by the difference of its drives: the kinds `turning` and `steps` of a "
+                    f"[[truth.manoeuvre]] order each one ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
                 )
             raise DocumentError(
                 f"no angle command turns {self.vessel.name}{what}", file=self.vessel.file, path="thruster"
