@@ -159,8 +159,11 @@ def _craft_lines(given: SmallCraft, name: str) -> Iterator[str]:
         key: TemplateValue(given.count * value.number, value.unit, f"{given.count} x {value.note}")
         for key, value in added_mass_values(one).items()
     }
-    yaw = added["N_rdot"].number + apart**2 * added["X_udot"].number
-    added["N_rdot"] = TemplateValue(yaw, "kg m^2", f"{added['N_rdot'].note}, and X_udot {apart:.3g} m off the middle")
+    added["N_rdot"] = TemplateValue(
+        added["N_rdot"].number + apart**2 * added["X_udot"].number,
+        "kg m^2",
+        f"{added['N_rdot'].note}, and X_udot {apart:.3g} m off the middle",
+    )
     yield from block_lines("added_mass", added, coriolis="mmg")
     yield from block_lines("hull.derivatives", _hull_values(given, added))
     yield from block_lines(
