@@ -159,8 +159,7 @@ def data_segment(
     segments = segment_log(declared, log or fetch_log(mapping))
     write_new(segments_text(segments, unit), file)
     with open_answer(as_json) as answer:
-        of_file = {"file"} if declared.source.runs is None else set[str]()
-        rows = [one.model_dump(exclude={"manoeuvre", *of_file}) for one in segments]
+        rows = [one.model_dump(exclude={"manoeuvre"}, exclude_none=True) for one in segments]
         answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: clock_moment(time, unit)))
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 

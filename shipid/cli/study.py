@@ -77,8 +77,9 @@ def study_new(
         answer.say("\n".join(sound), causes={name: one.cause for name, one in draft.diagnoses.items()})
         models = [model.name for model in draft.plan.foundations]
         named = f"{len(models)} {plural_word(len(models), 'foundation')} ({', '.join(models)})"
-        sentence = f"{draft.plan.cells} cells of {named} -> {file}"
-        answer.say(sentence, file=file, cells=draft.plan.cells, foundations=models)
+        answer.say(
+            f"{draft.plan.cells} cells of {named} -> {file}", file=file, cells=draft.plan.cells, foundations=models
+        )
         answer.say(f"run it with: shipid study run {quote_argument(file)}")
 
 

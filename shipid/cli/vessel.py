@@ -106,8 +106,18 @@ def vessel_new(
     check_values({"name": name or ""}, "vessel new")
     check_choice("kind", kind, ("ship", "usv"))
     called, of_usv = name or f"First guess, {length:g} m", kind == "usv"
-    of_ships = {"draught": draught, "block": block, "rpm": rpm, "shafts": shafts, "scale": scale}
-    of_ships |= {"propeller-diameter": propeller_diameter, "rudder-area": rudder_area}
+    of_ships: dict[str, Any] = {
+        "draught": draught,
+        "block": block,
+        "rpm": rpm,
+        "shafts": shafts,
+        "scale": scale,
+        "propeller-diameter": propeller_diameter,
+        "rudder-area": rudder_area,
+        "tunnel-thruster": tunnel_thruster or None,
+        "propulsor": None if propulsor == "propeller-rudder" else propulsor,
+        "ship-type": None if ship_type == "cargo" else ship_type,
+    }
     of_usvs = {"mass": mass, "thruster": thruster, "thrust": thrust, "hulls": hulls, "swivel": swivel or None}
     needed = {"mass": mass, "speed": speed, "thruster": thruster} if of_usv else {"draught": draught, "block": block}
     if lacking := next((option for option, value in needed.items() if value is None), None):
@@ -119,17 +129,15 @@ def vessel_new(
         places = tuple(_parse_place(text) for text in thruster or ())
         guessed = guess_craft(SmallCraft(length, beam, mass, speed, places, thrust, swivel, hulls), called, str(out))
     else:
-        given = Particulars(
+        guessed = first_guess(Particulars(
             length, beam, draught or 0.0, block or 0.0, speed, propulsor, ship_type, rpm, shafts, propeller_diameter,
             rudder_area, tunnel_thruster, scale,
-        )  # fmt: skip
-        guessed = first_guess(given, called, str(out))
+        ), called, str(out))  # fmt: skip
     write_text(out, guessed.text)
     with open_answer(as_json) as answer:
-        count = len(guessed.vessel.parameters)
+        n, count = guessed.n, len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)
-        held = f"{60 * guessed.n:.4g} {guessed.unit} hold {guessed.speed:.3g} m/s"
-        answer.say(held, n=guessed.n, speed=guessed.speed)
+        answer.say(f"{60 * n:.4g} {guessed.unit} hold {guessed.speed:.3g} m/s", n=n, speed=guessed.speed)
         grows = "" if guessed.growth < 0 else f": a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
         answer.say(f"course-{'UNSTABLE' if grows else 'stable'} by these formulae{grows}", growth=guessed.growth)
         judged, notes = measure_trials(guessed.vessel, guessed.speed)

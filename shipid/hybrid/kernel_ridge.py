@@ -55,8 +55,7 @@ class KernelProblem(PathProblem):
     def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> Tensor:
         """Kernels (K, S, C) between windows, with the settings of a trial: those of x and of y, or one of both."""
         scales = torch.stack([self._tensor(settings[name]) for name in self.scales])
-        around = self.values[centres] / scales
-        sides = self.sides[:, points] / scales
+        sides, around = self.sides[:, points] / scales, self.values[centres] / scales
         return mirror_sums(kernel_values(sides, around, settings["linear"], torch))
 
     def folds_left_out(self, number: int) -> list[tuple[Index, Index]]:

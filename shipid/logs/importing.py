@@ -521,7 +521,7 @@ def _cut_files(
     """The runs of several files: the segments of each, the whole file where it has none; rows in none are counted."""
     unit, frames, left = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), 0
     for index, one in enumerate(mapping.segment):
-        if one.file not in logs or one.run in logs.keys() - {one.file}:
+        if one.file not in logs or one.run in logs.keys() - {cut.file for cut in mapping.segment}:
             file, path = next(iter(logs.values())).parent, f"segment.{index}"
             if one.file in logs:
                 raise DataError(f"a run {one.run!r} exists, a whole file: take another name", file=file, path=path)

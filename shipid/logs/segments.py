@@ -37,27 +37,24 @@ def find_manoeuvres(dataset: Dataset, unit: float = 1.0, *, files: bool = False)
 
     unit : of the log's clock [s], in which starts and ends are given. files : whether each run is a file of several.
     """
-    cuts = []
-    for run, rows in stretches_of_runs(dataset):
-        t, file = rows["t"].to_numpy() / unit, run if files else None
-        cuts += [(kind, file, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
     counts: dict[str, int] = {}
     segments = []
-    for kind, file, start, end in cuts:
-        counts[kind] = counts.get(kind, 0) + 1
-        named: Any = {"run": f"{kind} {counts[kind]}", "file": file, "manoeuvre": kind}
-        segments.append(Segment(start=start, end=end, **named))
+    for run, rows in stretches_of_runs(dataset):
+        t, file = rows["t"].to_numpy() / unit, run if files else None
+        for kind, (first, last) in _of_stretch(rows):
+            counts[kind] = counts.get(kind, 0) + 1
+            named: Any = {"run": f"{kind} {counts[kind]}", "file": file, "manoeuvre": kind}
+            segments.append(Segment(start=float(t[first]), end=float(t[last]), **named))
     return segments
 
 
 def run_kind(rows: pd.DataFrame) -> str:
-    """The kind of manoeuvre that takes half of a run or more; mixed where none does."""
+    """The kind of manoeuvre that takes more than half of a run; mixed where none does."""
     t = rows["t"].to_numpy()
-    spans: dict[str, float] = {}
+    spans = {MIXED: (t[-1] - t[0]) / 2}
     for kind, (first, last) in _of_stretch(rows):
-        spans[kind] = spans.get(kind, 0.0) + float(t[last] - t[first])
-    kind = max(spans, key=lambda kind: spans[kind], default=MIXED)
-    return kind if spans and spans[kind] >= (t[-1] - t[0]) / 2 else MIXED
+        spans[kind] = spans.get(kind, 0.0) + t[last] - t[first]
+    return max(spans, key=lambda kind: spans[kind])
 
 
 def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:

@@ -77,8 +77,8 @@ class Controls:
             what = ": a manoeuvre needs that of a rudder or an azimuth unit"
             if self.differential:
                 what = (
-                    ", it steers by its shafts: the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each "
-                    f"one ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
+                    ", it steers by the difference of its drives: the kinds `turning` and `steps` of a "
+                    f"[[truth.manoeuvre]] order each one ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
                 )
             raise DocumentError(
                 f"no angle command turns {self.vessel.name}{what}", file=self.vessel.file, path="thruster"
@@ -97,7 +97,7 @@ class Controls:
 
     @cached_property
     def _driving(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Shaft speeds and forces that push the vessel ahead, if any, and the sides to which some turn her."""
+        """Shaft speeds and forces that push the vessel ahead, if any, and the sides to which some turn it."""
         vessel = self.vessel
         idle = straight_acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         if not np.isfinite(idle).all():
@@ -135,13 +135,13 @@ class Controls:
         return {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
 
     def ahead(self, n: float) -> dict[str, float]:
-        """Every command on a straight course: what drives her at n (`drive_scale`), all else neutral."""
+        """Every command on a straight course: what drives it at n (`drive_scale`), all else neutral."""
         return {name: n * drive_scale(name) if name in self.drives else neutral_value(name) for name in self.commands}
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
         """Every command (T,) from n [rev/s] (`drive_scale`) and helm angle [rad, > 0 to starboard], each (T,).
 
-        With the helm amidships no angle need turn the ship: two screws that steer by their difference can stop her.
+        With the helm amidships no angle need turn the ship: two screws that steer by their difference can stop it.
         """
         ordered = {name: n * drive_scale(name) for name in self.drives}
         ordered |= {name: sign * helm for name, sign in self.helm.items()} if helm.any() else {}

@@ -136,9 +136,9 @@ def proposed_horizon(vessel: Vessel | None, seen: Survey) -> tuple[float, float,
     """Horizon in whole steps, step [s], and why the horizon, of a new study of a vessel and its runs."""
     durations = seen.runs["duration"].tolist()
     horizon, why = horizon_of(vessel.length if vessel else None, seen.speed, durations)
-    if vessel is None:
-        most = STEPS_AHEAD_OF_LOG * seen.step
-        horizon, why = min(horizon, most), f"{most:g} s, {STEPS_AHEAD_OF_LOG} rows of the log: no vessel gives a length"
+    most = STEPS_AHEAD_OF_LOG * seen.step
+    if vessel is None and most < horizon:
+        horizon, why = most, f"{most:g} s, {STEPS_AHEAD_OF_LOG} rows of the log: no vessel gives a length"
     step = step_of(horizon, seen.step)
     return max(round(horizon / step), 2) * step, step, why
 

@@ -30,11 +30,12 @@ from shipid.vessel.regressions import (
     thrust_polynomial,
     wave_resistance,
 )
-from shipid.vessel.stability import balanced_shaft_speed, bisect_root, straight_acceleration, yaw_growth
+from shipid.vessel.stability import MOST_SHAFT, balanced_shaft_speed, bisect_root, straight_acceleration, yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
-BEAMY = 0.5  # of the charts' yaw inertia: where Clarke's formula, which falls with the beam, gives less, charts do
+BEAMY = 0.5  # of the charts' yaw inertia: where Clarke's formula, which falls with the beam, gives less, charts do,
+NARROW = 4.0  # but not from this length / beam on, which Clarke's ships had
 MOST_N_RR = -0.003  # of full and beamy ships, to which the formula gives 0 and more: yaw is damped, and can be fitted
 ROUNDING = 1e-9  # of the quotient of two numbers as people write them, such as 5.4 / 3
 SHORTEST = 3.0  # length / beam of the ships behind most formulae
@@ -147,7 +148,7 @@ class FirstGuess:
     """A template filled in.
 
     text : TOML.  vessel : the same, checked.  n : shaft speed [rev/s] that holds the service speed [m/s].
-    unit : of 60 n, rpm, or N where forces drive the vessel.
+    unit : of 60 n, rpm, or N of each thruster.
     remarks : what the numbers given imply and a reader should know, one sentence each.
     growth : the largest growth rate [1/s] of a small yaw at that speed, helm amidships; negative: course-stable.
     """
@@ -168,12 +169,17 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
 
 
 def finish_guess(
-    lines: Iterable[str], file: str, speed: float, remarks: tuple[str, ...], unit: str = "rpm"
+    lines: Iterable[str],
+    file: str,
+    speed: float,
+    remarks: tuple[str, ...],
+    unit: str = "rpm",
+    most: float = MOST_SHAFT,
 ) -> FirstGuess:
     """Check a document, line by line, and put above it what it needs for a speed [m/s] and whether it is stable."""
     body = "\n".join(lines)
     vessel = check_document(tomllib.loads(body), file)
-    n = _service_shaft(vessel, speed)
+    n = _service_shaft(vessel, speed, most)
     rate = yaw_growth(vessel, speed, _straight_orders(vessel, n))
     verdict = (
         f"course-{'stable' if rate < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({rate:+.4f} t))"
@@ -266,7 +272,7 @@ def added_mass_values(given: Particulars) -> Values:
     by_yaw, by_sway = prime * L * (0.67 * B / L - 0.0033 * (B / T) ** 2), prime * L * (1.1 * B / L - 0.041 * B / T)
     m = given.rho * given.volume
     m_x, m_y, k_zz = motora_added_mass(L, B, T, C_b)
-    if -yaw < BEAMY * m * k_zz**2 or sway * yaw <= ((by_yaw + by_sway) / 2) ** 2:
+    if (L / B < NARROW and -yaw < BEAMY * m * k_zz**2) or sway * yaw <= ((by_yaw + by_sway) / 2) ** 2:
         charts, symmetric = "Motora's charts, by Zhou et al. (1983)", "a beamy ship counts as alike fore and aft"
         return {
             "X_udot": TemplateValue(-m * m_x, "kg", charts),
@@ -642,9 +648,11 @@ def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     }
 
 
-def _service_shaft(vessel: Vessel, speed: float) -> float:
-    """Shaft speed [rev/s] at which thrust equals resistance, by bisection."""
-    n = balanced_shaft_speed(lambda n: float(straight_acceleration(vessel, speed, _straight_orders(vessel, n))[0]))
+def _service_shaft(vessel: Vessel, speed: float, most: float) -> float:
+    """Shaft speed [rev/s] or force (`drive_scale`) at which thrust equals resistance, by bisection up to a greatest."""
+    n = balanced_shaft_speed(
+        lambda n: float(straight_acceleration(vessel, speed, _straight_orders(vessel, n))[0]), most
+    )
     if n is None:
-        raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
+        raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
     return n

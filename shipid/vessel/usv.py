@@ -14,6 +14,7 @@ from functools import cached_property
 
 from shipid.errors import ShipidError
 from shipid.units import GRAVITY
+from shipid.vessel.stability import MOST_FORCE
 from shipid.vessel.template import (
     RHO_SEA,
     FirstGuess,
@@ -27,6 +28,7 @@ from shipid.vessel.template import (
 )
 
 SLENDER = 2.5  # length / beam from which on a craft counts as one hull
+BEAMIEST = 2.2  # least length / beam of one hull: below, the formulae would not damp yaw
 PONTOON, PONTOON_BLOCK, BLOCK = 0.23, 0.4, 0.45  # beam of one of two hulls over that of the craft; block coefficients
 CRUISE = 0.7  # of the top speed: the service speed
 ASTERN = 0.56  # least thrust over the greatest, 13.6 kgf over 24.4 kgf of the Otter
@@ -64,29 +66,23 @@ class SmallCraft:
         return Particulars(self.length, beam, draught, block, self.top_speed, scale=1.0)
 
     @property
-    def froude(self) -> float:
-        """Froude number at the top speed."""
-        return self.top_speed / math.sqrt(GRAVITY * self.length)
-
-    @property
     def resistance(self) -> float:
         """Resistance [N] at the top speed: that of the thrust given, else of the Otter by Froude's rule."""
-        if self.thrust is not None:
-            return self.thrust * len(self.thrusters)
-        return OTTER_THRUST * self.froude**2 * self.mass * GRAVITY
+        otter = OTTER_THRUST * self.top_speed**2 / self.length * self.mass  # of the weight, and F_n^2
+        return otter if self.thrust is None else self.thrust * len(self.thrusters)
 
 
 def guess_craft(given: SmallCraft, name: str, file: str) -> FirstGuess:
     """Fill a vessel document of a small craft; ShipidError for one that cannot be, or that nothing steers."""
     _check_craft(given)
-    lines, remarks = _craft_lines(given, name), tuple(_craft_remarks(given))
-    return finish_guess(lines, file, CRUISE * given.top_speed, remarks, unit="N")
+    speed, remarks = CRUISE * given.top_speed, tuple(_craft_remarks(given))
+    return finish_guess(_craft_lines(given, name), file, speed, remarks, "N of each thruster", MOST_FORCE)
 
 
 def _check_craft(given: SmallCraft) -> None:
     for path, value, low, high in (
         ("--length", given.length, 0.3, 20.0),
-        ("--beam", given.beam, 0.08 * given.length, given.length),
+        ("--beam", given.beam, 0.08 * given.length, given.length / (BEAMIEST if given.hulls == 1 else 1.0)),
         ("--mass", given.mass, 1e-3 * given.length**3, 300.0 * given.length**3),
         ("--speed", given.top_speed, 0.1, 2.0 * math.sqrt(GRAVITY * given.length)),
         ("--swivel", given.swivel, 0.0, 180.0),
@@ -94,14 +90,17 @@ def _check_craft(given: SmallCraft) -> None:
     ):
         if not low <= value <= high:
             raise ShipidError(f"{value:.3g}: small craft have {low:.3g} to {high:.3g}", path=path)
-    if not any(x or y for x, y in given.thrusters):
+    if not given.thrusters:
         raise ShipidError("missing: give the place X,Y [m] of each, such as -0.8,-0.4 and -0.8,0.4", path="--thruster")
-    if not given.swivel and len({y for _, y in given.thrusters}) == 1:
-        raise ShipidError("nothing turns this craft: give thrusters at two sides, or --swivel", path="--thruster")
-    if given.hull.draught > 2 * given.hull.beam:
+    (xs, ys), swivels = zip(*given.thrusters, strict=True), given.swivel > 0
+    if not (min(ys) < 0 < max(ys) or (swivels and any(xs))):
+        what = "X other than 0 to some thruster" if swivels else "thrusters at two sides, or --swivel"
+        raise ShipidError(f"nothing turns this craft: give {what}", path="--thruster")
+    added = {name: value.number for name, value in added_mass_values(given.hull).items()}
+    if given.hull.draught > given.count * given.hull.beam or max(added[x] for x in ("X_udot", "Y_vdot", "N_rdot")) >= 0:
         raise ShipidError(
-            f"each hull would have a draught of {given.hull.draught:.3g} m at a beam of {given.hull.beam:.3g} m: give "
-            "--hulls, or is the mass another one?",
+            f"each hull would have a draught of {given.hull.draught:.3g} m at a beam of {given.hull.beam:.3g} m, which "
+            "the formulae do not know: give --hulls, or is the mass another one?",
             path="--mass",
         )
 
@@ -146,31 +145,41 @@ def _craft_lines(given: SmallCraft, name: str) -> Iterator[str]:
         },
         RHO_SEA,
     )
-    inertia = {
-        "m": TemplateValue(given.mass, "kg", "given"),
-        "I_z": TemplateValue(given.mass * (0.25 * L) ** 2, "kg m^2", "m (0.25 L)^2, as of the Otter, Fossen (2021)"),
-        "x_G": TemplateValue(0.0, "m", "assumed amidships"),
-    }
-    yield from block_lines("inertia", inertia)
+    yield from block_lines(
+        "inertia",
+        {
+            "m": TemplateValue(given.mass, "kg", "given"),
+            "I_z": TemplateValue(
+                given.mass * (0.25 * L) ** 2, "kg m^2", "m (0.25 L)^2, as of the Otter, Fossen (2021)"
+            ),
+            "x_G": TemplateValue(0.0, "m", "assumed amidships"),
+        },
+    )
     added = {
         key: TemplateValue(given.count * value.number, value.unit, f"{given.count} x {value.note}")
         for key, value in added_mass_values(one).items()
     }
-    yaw = added["N_rdot"].number + apart**2 * added["X_udot"].number
-    added["N_rdot"] = TemplateValue(yaw, "kg m^2", f"{added['N_rdot'].note}, and X_udot {apart:.3g} m off the middle")
+    added["N_rdot"] = TemplateValue(
+        added["N_rdot"].number + apart**2 * added["X_udot"].number,
+        "kg m^2",
+        f"{added['N_rdot'].note}, and X_udot {apart:.3g} m off the middle",
+    )
     yield from block_lines("added_mass", added, coriolis="mmg")
     yield from block_lines("hull.derivatives", _hull_values(given, added))
-    drag = {
-        "C_d": TemplateValue(1.0, "-", "of the first hull; Hoerner's curve, Fossen (2021), sec. 6.7: a guess"),
-        "x_aft": TemplateValue(-L / 2, "m", "-L / 2"),
-        "x_fwd": TemplateValue(L / 2, "m", "L / 2"),
-    }
-    yield from block_lines("hull.crossflow", drag, strips=20)
+    yield from block_lines(
+        "hull.crossflow",
+        {
+            "C_d": TemplateValue(1.0, "-", "of the first hull; Hoerner's curve, Fossen (2021), sec. 6.7: a guess"),
+            "x_aft": TemplateValue(-L / 2, "m", "-L / 2"),
+            "x_fwd": TemplateValue(L / 2, "m", "L / 2"),
+        },
+        strips=20,
+    )
     sides: list[str] = []
     for x, y in given.thrusters:
         sides.append("port" if y < 0 else "starboard" if y > 0 else "middle")
-        again = f"_{sides.count(sides[-1])}" if sides.count(sides[-1]) > 1 else ""
-        yield from _thruster_block(given, f"thruster.{sides[-1]}{again}", x, y)
+        count = sides.count(sides[-1])
+        yield from _thruster_block(given, f"thruster.{sides[-1]}{f'_{count}' if count > 1 else ''}", x, y)
 
 
 def _thruster_block(given: SmallCraft, path: str, x: float, y: float) -> Iterator[str]:

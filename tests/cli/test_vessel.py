@@ -50,7 +50,7 @@ USV = ("vessel", "new", "--kind", "usv", "--length", 2, "--beam", 1.08)
 def test_a_new_craft_from_its_thrusters(tmp_path: Path) -> None:
     places = ("--thruster", "-0.8,-0.4", "--thruster", "-0.8,0.4", "--out", tmp_path / "craft.toml")
     text = output_of(*USV, "--mass", 80, "--speed", 3, *places, "--thrust", 100)
-    assert "49 N hold 2.1 m/s" in text  # each; 100 N at 3 m/s, and the square of 0.7 of it
+    assert "49 N of each thruster hold 2.1 m/s" in text  # 100 N at 3 m/s, and the square of 0.7 of it
     assert "course-stable" in text
     assert load_vessel(str(tmp_path / "craft.toml")).parameters["thruster.port.actuator.force.high"] == 100.0
 
@@ -64,13 +64,10 @@ def test_a_new_craft_from_its_thrusters(tmp_path: Path) -> None:
         (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--rpm", 90), "--rpm: is of a ship: leave it out"),
         (("--kind", "ship", "--mass", 80, "--draught", 1, "--block", 0.5), "--mass: is of a usv: leave it out"),
         (("--kind", "ship", "--block", 0.5), "--draught: missing: a ship needs it"),
-        (
-            (
-                "--kind",
-                "boat",
-            ),
-            "kind",
-        ),
+        (("--kind", "boat"), "boat"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--ship-type", "tanker"), "--ship-type: is of a ship"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--propulsor", "azimuth"), "--propulsor: is of a ship"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--tunnel-thruster"), "--tunnel-thruster: is of a ship"),
     ],
 )
 def test_options_of_another_kind_of_vessel_are_one_line(options: tuple[Any, ...], message: str, tmp_path: Path) -> None:

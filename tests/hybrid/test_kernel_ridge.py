@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from scipy.optimize import check_grad, minimize
 
+from shipid.hybrid import kernel_ridge
 from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.kernel_ridge import FoldBlocks, KernelProblem
 from shipid.hybrid.method import Task
@@ -41,14 +44,24 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(kind: str) -> None
         np.testing.assert_allclose(errors[np.abs(errors).sum(axis=1) > 0], expected, atol=1e-10)
 
 
-def test_the_slope_is_the_difference() -> None:
-    rng, blocks = np.random.default_rng(1), FoldBlocks(FOLDS, ALL, "cpu")
-    features, outputs = rng.normal(size=(len(ALL), 200)), torch.tensor(rng.normal(size=(1, len(ALL), 3)))
-    kernel, way = (torch.tensor(one @ one.T / 200)[None] for one in (features, rng.normal(size=(len(ALL), 9))))
-    kernel += 0.3 * torch.eye(len(ALL))
-    up, down = ((blocks.errors_and_slope(kernel + h * way, outputs)[0] ** 2).sum() for h in (1e-5, -1e-5))
-    slope = (blocks.errors_and_slope(kernel, outputs)[1] * way).sum()
-    assert float((up - down) / 2e-5) == pytest.approx(float(slope), rel=1e-6)
+@pytest.mark.parametrize("mirror", [True, False])
+def test_a_descent_goes_by_the_kernel_of_the_solution_and_by_its_slope(mirror: bool, monkeypatch: Any) -> None:
+    """Its value is the error of fits with that kernel; its slope by hand is the difference."""
+    method = SMALL.model_copy(update={"mirror": mirror})
+    problem, blocks = KernelProblem(method, given(), "one"), FoldBlocks(FOLDS, ALL, "cpu")
+    assert len(problem.sides) == 1 + mirror
+
+    def check(function: Any, start: np.ndarray, **how: Any) -> Any:
+        away = start + np.linspace(-0.3, 0.4, len(start))
+        assert check_grad(lambda x: function(x)[0], lambda x: function(x)[1], away) < 1e-5
+        kernel = problem.kernels(ALL, ALL, point) + point["ridge"] * torch.eye(len(ALL), dtype=torch.float64)
+        missed, _ = blocks.errors_and_slope(kernel, problem.outputs[:, ALL])
+        assert function(start)[0] == pytest.approx(float((missed**2).sum().log()), rel=1e-10)
+        return minimize(function, start, **how)
+
+    monkeypatch.setattr(kernel_ridge, "minimize", check)
+    point = next(iter(method.points()))
+    problem.descend(point)
 
 
 @pytest.mark.parametrize("centres", [1000, 60])  # all windows, and a part of them

@@ -369,11 +369,16 @@ def test_segments_of_several_files_cut_those_that_they_name_and_leave_the_others
     for name in "ab":
         craft_log([1500.0] * 10, logs, f"{name}.csv")
     data = import_log(read_mapping(craft_mapping(tmp_path, SEGMENTS, head)), logs)
-    times = {run: part["t"].tolist() for run, part in data.frame.groupby("run")}
-    assert times == {"drive 1": [1, 2, 3], "drive 2": [4, 5, 6, 7, 8], "b": [*range(10)]}
+    assert data.frame.groupby("run")["t"].apply(list).to_dict() == {
+        "drive 1": [1, 2, 3],
+        "drive 2": [4, 5, 6, 7, 8],
+        "b": [*range(10)],
+    }
     assert data.metadata["manoeuvres"] == {"drive 1": "mixed"}
-    left = [(one["count"], one["note"]) for one in data.metadata["repairs"] if one["kind"] == "left out"]
-    assert left == [(2, "of 20 rows: in no segment")]
+    (left,) = (one for one in data.metadata["repairs"] if one["kind"] == "left out")
+    assert (left["count"], left["note"]) == (2, "of 20 rows: in no segment")
+    crossed = SEGMENTS.replace('run = "drive 2"\nfile = "a"', 'run = "a"\nfile = "b"')  # no file stays whole
+    assert {*import_log(read_mapping(craft_mapping(tmp_path, crossed, head)), logs).frame["run"]} == {"drive 1", "a"}
     for wrong, message in (('file = "c"', "no file 'c'"), ('run = "b"', "a run 'b' exists")):
         written = SEGMENTS.replace('file = "a"' if "file" in wrong else 'run = "drive 2"', wrong)
         with pytest.raises(DataError, match=message):

@@ -136,7 +136,8 @@ def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:
 
 def craft_by_force(kind: str = "force", gear: str = "") -> Vessel:
     """A craft of 5 m, two thrusters 2 m apart at the origin's length; the numbers are made up for round answers."""
-    text = f"""
+    return check_document(
+        tomllib.loads(f"""
     name = "craft"
     dof = 3
     particulars.L_pp = 5.0
@@ -159,8 +160,9 @@ def craft_by_force(kind: str = "force", gear: str = "") -> Vessel:
     x = 0.0
     y = 1.0
     {gear}
-    """
-    return check_document(tomllib.loads(text), "craft.toml")
+    """),
+        "craft.toml",
+    )
 
 
 def settle(vessel: Vessel, **orders: float) -> Trajectories:
@@ -173,8 +175,7 @@ def settle(vessel: Vessel, **orders: float) -> Trajectories:
 @pytest.mark.parametrize("kind", ["force", "swivel_force"])
 def test_a_force_gives_the_speed_and_the_yaw_rate_of_a_calculation_by_hand(kind: str) -> None:
     """50 u + 25 u^2 = 2 x 100 N at u = 2 m/s; 300 r + 100 r^2 = 2 x 60.5 N x 1 m at r = 0.36015 rad/s, on the spot."""
-    craft, alpha = craft_by_force(kind), {"port__alpha": 0.0, "starboard__alpha": 0.0}
-    angles = alpha if kind == "swivel_force" else {}
+    craft, angles = craft_by_force(kind), {"port__alpha": 0.0, "starboard__alpha": 0.0} if "swivel" in kind else {}
     ahead = settle(craft, port__force=100.0, starboard__force=100.0, **angles)
     assert ahead["u"][-1].item() == pytest.approx(2.0, rel=1e-9)
     turned = settle(craft, port__force=60.5, starboard__force=-60.5, **angles)
@@ -195,7 +196,5 @@ def test_limits_of_a_force_differ_ahead_and_astern_and_its_lag_is_that_of_the_ac
 
 
 def test_a_swivelled_force_pushes_to_where_it_is_turned() -> None:
-    force, alpha = ca.SX.sym("force"), ca.SX.sym("alpha")
-    wrench = ca.Function("f", [force, alpha], [thruster.swivel_force_wrench(force, alpha, x=ca.SX(-2.0), k_T=0.5)])
-    force_and_moment = np.array(wrench(10.0, np.pi / 6)).ravel()[[0, 1, 5]].tolist()
-    assert force_and_moment == pytest.approx([5 * np.cos(np.pi / 6), 2.5, -5.0])  # aft, to starboard: turns to port
+    wrench = numbers(thruster.swivel_force_wrench(ca.SX(10.0), ca.SX(np.pi / 6), x=ca.SX(-2.0), k_T=0.5))
+    assert wrench[[0, 1, 5]] == pytest.approx([5 * np.cos(np.pi / 6), 2.5, -5.0])  # aft, to starboard: turns to port

@@ -57,7 +57,10 @@ def test_two_screws_steer_by_their_difference() -> None:
     """Any two to either side of the middle; not one, nor two in line, nor those of a ship with a helm."""
     otter = Controls(load_vessel("otter"))
     assert otter.differential
-    with pytest.raises(DocumentError, match=r"no angle command turns .* steers by its shafts: .* each one .port.n_rpm"):
+    with pytest.raises(
+        DocumentError,
+        match=r"no angle command turns .* steers by the difference of its drives: .* each one .port.n_rpm",
+    ):
         _ = otter.helm
     assert otter.ahead(2.0) == {"port.n": 2.0, "starboard.n": 2.0}
     inline = otter.vessel.with_values({"thruster.port.y": 0.0, "thruster.starboard.y": 0.0})

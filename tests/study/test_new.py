@@ -32,6 +32,7 @@ from shipid.study.new import (
     amounts_of_data,
     draft_study,
     horizon_of,
+    proposed_horizon,
     step_of,
 )
 from shipid.study.plan import read_plan
@@ -396,18 +397,13 @@ def test_recorded_sets(
     assert all(runs[name] < runs.max() for name in document["split"]["test"])
 
 
-def without_commands(folder: Path) -> Path:
-    """A log of a ship of which no order is known, as of AIS or a phone."""
-    dataset = trial(8, duration=200.0)
-    orders = [name for name in dataset.frame if "." in str(name)]
-    return write_dataset(Dataset(dataset.frame.drop(columns=orders), dataset.metadata), folder / "ais.parquet")
-
-
 @pytest.mark.slow
 def test_a_log_without_commands_is_studied_without_physics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the command line, as it is drafted: data alone, a regression and constant u, v, r; a vessel needs orders."""
     monkeypatch.chdir(tmp_path)
-    without_commands(tmp_path)
+    dataset = trial(8, duration=200.0)
+    orders = [name for name in dataset.frame if "." in str(name)]
+    write_dataset(Dataset(dataset.frame.drop(columns=orders), dataset.metadata), Path("ais.parquet"))
     refused = CliRunner().invoke(app, ["study", "new", "--data", "ais.parquet", "--vessel", SHIP])
     assert "the data have no commands: `shipid study new` without --vessel needs none" in str(refused.exception)
     written = CliRunner().invoke(app, ["study", "new", "--data", "ais.parquet"])
@@ -423,6 +419,12 @@ def test_a_log_without_commands_is_studied_without_physics(tmp_path: Path, monke
     assert re.search(r"^30 s ahead, data alone with 2 runs err by [\d.]+ m on average, nine in ten below", answer)
     assert "regression without physics on 2 runs" in answer
     assert "constant u, v, r" in answer
+
+
+def test_without_a_vessel_short_runs_set_the_horizon_and_say_so() -> None:
+    """A third of the median run is below 30 rows."""
+    ahead, _, why = proposed_horizon(None, survey_dataset(trial(2, duration=60.0)))
+    assert (ahead, why[:25]) == (pytest.approx(20.0), "a third of the median run")
 
 
 def test_neither_a_vessel_nor_runs_is_refused() -> None:

@@ -36,9 +36,16 @@ def run(vessel: Vessel, seconds: float, speed: float, orders: dict[str, float], 
     start = dict.fromkeys(model.state, np.zeros(1)) | {"u": np.array([speed]), "r": np.array([r])}
     values = {name: np.array([orders.get(name, 0.0)]) for name in model.commands}
     step = 0.005 * (vessel.length or 1.0) ** 0.5
-    memory = {name: values[name] for name in model.memory}
-    steps = 10 * round(seconds / step / 10)
-    return rollout(vessel, start, values, {}, step=step, num_steps=steps, every=10, memory=memory)
+    return rollout(
+        vessel,
+        start,
+        values,
+        {},
+        step=step,
+        num_steps=10 * round(seconds / step / 10),
+        every=10,
+        memory={name: values[name] for name in model.memory},
+    )
 
 
 def full_ahead(guess: FirstGuess) -> dict[str, float]:
@@ -78,10 +85,14 @@ def test_a_straight_run_is_stable_or_said_not_to_be(seed: int) -> None:
 
 def test_the_draught_is_that_of_the_otter_and_the_thrust_given_is_kept() -> None:
     """0.195 m with 80 kg, of the published model; 120 N of each thruster make the top speed."""
-    particulars = guess_craft(OTTER, "otter", "otter.toml").vessel.document["particulars"]
-    assert particulars["T"] == pytest.approx(0.1951, rel=0.01)
+    assert guess_craft(OTTER, "a", "a.toml").vessel.document["particulars"]["T"] == pytest.approx(0.1951, rel=0.01)
     strong = guess_craft(replace(OTTER, thrust=120.0), "otter", "otter.toml")
     assert set(full_ahead(strong).values()) == {120.0}
+    assert "the ship needs 58.8 N of each thruster" in strong.text  # 0.49 of it
+    slim = replace(OTTER, length=4.0, beam=1.44, mass=96.0, hulls=2)
+    assert guess_craft(slim, "a", "a.toml").vessel.parameters["added_mass.X_udot"] < 0  # charts of beamy ships say > 0
+    heavy = SmallCraft(15.0, 5.0, 2e4, 12.0, ((-6.0, -2.0), (-6.0, 2.0)), 2e5)
+    assert 60 * guess_craft(heavy, "a", "a.toml").n == pytest.approx(0.49 * 2e5)
     assert strong.vessel.parameters["hull.derivatives.X_u|u|"] == pytest.approx(-240.0 / 3.09**2, rel=1e-5)
 
 
@@ -90,6 +101,13 @@ def test_the_draught_is_that_of_the_otter_and_the_thrust_given_is_kept() -> None
     [
         ({"thrusters": ((-0.8, 0.0),)}, "--thruster: nothing turns this craft"),
         ({"thrusters": ()}, "--thruster: missing: give the place"),
+        (
+            {"thrusters": ((-0.8, 0.1), (-0.8, 0.4))},
+            "--thruster: nothing turns this craft: give thrusters at two sides",
+        ),
+        ({"thrusters": ((0.0, 0.0),), "swivel": 30.0}, "nothing turns this craft: give X other than 0"),
+        ({"hulls": 1, "beam": 1.6}, "--beam: 1.6: small craft have 0.16 to 0.909"),
+        ({"mass": 0.1}, "--mass: each hull would have a draught of"),
         ({"mass": 0.0}, "--mass: 0: small craft have"),
         ({"top_speed": 30.0}, "--speed: 30: small craft have 0.1 to 8.86"),
         ({"mass": 1500.0}, "--mass: each hull would have a draught of"),

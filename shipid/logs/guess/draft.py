@@ -71,8 +71,8 @@ def draft_text(guess: Guess) -> str:
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
     """The manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
     whole = mapping.model_copy(update={"segment": (), "resample": None})
-    files = mapping.source.runs is not None
-    return cutting.find_manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"), files=files)
+    unit = to_si(mapping.clock.unit, "t")
+    return cutting.find_manoeuvres(import_log(whole, log), unit, files=mapping.source.runs is not None)
 
 
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
