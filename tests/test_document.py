@@ -93,17 +93,19 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
         with pytest.raises(DocumentError, match=remedy) as caught:
             documents.read_document(file)
         assert caught.value.file == str(file)
-    (tmp_path / "secret").write_text("TOKEN=hunter2\n")
-    with pytest.raises(DocumentError) as caught:  # what another file names may be anything: nothing of it is shown
-        documents.read_document(tmp_path / "secret")
-    assert "hunter2" not in str(caught.value)
+    for name in ("secret", "secret.toml"):  # what another file names may be anything: nothing of it is shown
+        for content in ("TOKEN=hunter2", "[hunter2]\n[hunter2]", "a = {hunter2=1,hunter2=2}", 'a = "hunter2\\u001b"'):
+            (tmp_path / name).write_text(content)
+            with pytest.raises(DocumentError) as caught:
+                documents.read_document(tmp_path / name)
+            assert "hunter2" not in str(caught.value)
     for missing in (tmp_path / "gone.toml", tmp_path):
         with pytest.raises(DocumentError, match="cannot be read"):
             documents.read_document(missing)
 
 
-def test_a_line_that_is_no_toml_is_shown() -> None:
-    with pytest.raises(DocumentError, match=r"\(at line 2, column 9\): 'x_G = -3,4'$"):
+def test_the_place_that_is_no_toml_is_named() -> None:
+    with pytest.raises(DocumentError, match=r"\(at line 2, column 9\)$"):
         documents.parse_toml("a = 1\nx_G = -3,4\nb = 2\n")
 
 
@@ -208,15 +210,15 @@ def test_a_quoted_key_may_hold_dots() -> None:
 @pytest.mark.parametrize(
     ("text", "remedy"),
     [
-        ("a.b = 1979-05-27", "a.b: 1979-05-27: a date: give"),
-        ("a = [1, 07:32:00]", "a.1: 07:32:00: a time: give"),
+        ("a.b = 1979-05-27", "a.b: a date: give"),
+        ("a = [1, 07:32:00]", "a.1: a time: give"),
         ("a = " + "[" * 2000 + "]" * 2000, "maximum recursion depth"),
         (".".join("a" * 2000) + " = 1", "nested too deep"),
         ("a = " + "9" * 400, "a: an integer beyond 1e+15"),
         ("a = " + "9" * 4301, "Exceeds the limit"),
         ("a = 1e308", "a: 1e+308: no quantity of a ship"),
         ("a = [1.0, -1e-101]", "a.1: -1e-101: no quantity of a ship"),
-        ('a = "\\u001b[2J"', "a: '\\\\x1b[2J': text with a control character"),
+        ('a = "\\u001b[2J"', "a: text with a control character"),
         ('"\\u0007" = 1', "a name with a control character"),
     ],
 )
@@ -232,9 +234,7 @@ def test_values_that_no_document_holds(text: str, remedy: str, tmp_path: Path) -
 
 @pytest.mark.parametrize("value", [Decimal(3), {1}, b"x", object])
 def test_objects_that_toml_has_not(value: Any) -> None:
-    with pytest.raises(
-        DocumentError, match=r"^a\.1: .*: a \w+: give a number, a text, true or false, a list or a table$"
-    ):
+    with pytest.raises(DocumentError, match=r"^a\.1: a \w+: give a number, a text, true or false, a list or a table$"):
         documents.check_values({"a": [1, value]}, None)
 
 
@@ -254,12 +254,6 @@ def test_names_are_as_short_as_is_clear() -> None:
     assert documents.short_names(one_letter) == ("inertia.m", "K_T.J", "R_0")
     two_of_a_name = ["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]
     assert documents.short_names(two_of_a_name) == ("Y_v", "port.D_p", "starboard.D_p")
-
-
-def test_the_line_shown_is_that_of_the_parser() -> None:
-    """A line separator of Unicode in a comment ends no line of TOML."""
-    with pytest.raises(DocumentError, match=r"line 2, .*: 'b = = 1'"):
-        documents.parse_toml("a = 1  # x\u2028y\nb = = 1\n")
 
 
 def test_a_name_that_is_too_long_is_no_file() -> None:

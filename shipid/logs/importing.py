@@ -76,7 +76,8 @@ from shipid.physics.signals import is_command, is_output
 __all__ = ["file_digest", "import_log", "log_digest", "read_mapping", "run_files"]
 
 logger = logging.getLogger(__name__)
-_UNSAFE = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]|^\s*(?:[=@]|[+-](?!\d[\w .+-]*$))+")
+_STEERING = r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]"
+_UNSAFE = re.compile(rf"^(?:(?:{_STEERING}|\s)*(?:[=@]|[+-](?!\d[\w .+-]*$)))+|{_STEERING}")
 LIMITS = {"s": 1e12, "m": 1e8, "m/s": 200.0, "rad": 1e6, "rad/s": 100.0, "rev/s": 1e4, "N": 1e10, "N m": 1e12, "-": 1e4}
 """SI unit of a column -> the largest number that a ship may have: far beyond any, so that a wrong unit may pass."""
 Begins = list[tuple[float, str]]

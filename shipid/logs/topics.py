@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -83,14 +84,22 @@ def message_times(received: Array, stamps: Array) -> Array:
 @contextmanager
 def recording_errors(file: Path, what: str, library: str) -> Iterator[None]:
     """Turn a lacking library, and whatever it raises at a damaged file, into a DataError."""
+    console = os.dup(2)
     try:
-        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):  # into which some of them complain
+        with open(os.devnull, "wb") as silent, redirect_stdout(io.StringIO()):  # where some of them complain, in C too
+            os.dup2(silent.fileno(), 2)
             yield
     except ImportError:
         message = f"{what} needs {library}: pip install 'shipid[robots]'"
         raise DataError(message, file=file, path="format.kind") from None
-    except (DataError, PermissionError, MemoryError):
+    except MemoryError:  # for a count that is false, or a recording that is large
+        message = f"{what} that asks for more memory than there is: damaged, or name the topics that are needed"
+        raise DataError(message, file=file, path="format.topics") from None
+    except (DataError, PermissionError):
         raise
     except Exception as error:  # these libraries raise any of a dozen
         message = f"not {what}, or damaged ({type(error).__name__}): set [format] kind"
         raise DataError(message, file=file, path="format.kind") from None
+    finally:
+        os.dup2(console, 2)
+        os.close(console)

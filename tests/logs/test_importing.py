@@ -435,6 +435,8 @@ NAMES_OF_FILES = {
     "Z_20": "Z_20",
     "Überfahrt ø": "Überfahrt ø",
     "=": "run",
+    "\x1b=cmd": "cmd",
+    "\u202e @SUM(1)": "SUM(1)",
 }
 
 

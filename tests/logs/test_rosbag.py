@@ -10,6 +10,7 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.logs.formats import TopicsFormat
+from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.readers import list_topics, read_log_table
 from tests.logs.conftest import T, turning
@@ -123,6 +124,7 @@ def test_a_recording_of_ros(kind: str, tmp_path: Path) -> None:
     assert listed["/odom"]["messages"] == len(T)
     assert listed["/odom"]["rate"] == pytest.approx(2.0)
     assert "pose.pose.orientation.w" in listed["/odom"]["fields"]
+    assert recognise_log(file, ("/odom",)).form == {"kind": "rosbag", "topics": ["/odom"]}
 
 
 def test_topics_that_are_not_asked_for_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -47,3 +47,11 @@ def test_a_library_that_is_not_there_is_named() -> None:
         recording_errors(Path("log.bag"), "a recording of ROS", "rosbags"),
     ):
         raise ImportError
+
+
+def test_a_count_that_no_memory_holds_is_one_line() -> None:
+    with (
+        pytest.raises(DataError, match="more memory than there is: damaged"),
+        recording_errors(Path("log.mcap"), "a recording of ROS", "rosbags"),
+    ):
+        raise MemoryError

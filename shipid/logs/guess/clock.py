@@ -463,7 +463,7 @@ def _unit_of_clock(name: str, values: Array) -> str:
     ]
     if since and (since != ["s"] or ends):  # however far apart; seconds without the name may be milliseconds of weeks
         return since[0]
-    if len(steps) and np.median(steps) >= 20 and not np.any(values % 1):
+    if len(steps) and np.median(steps) >= 20 and not (since and np.any(values % 1)):
         return next((unit for unit, least in FINE.items() if np.median(steps) >= least), "ms")
     return "s"
 

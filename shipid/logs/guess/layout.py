@@ -49,13 +49,13 @@ def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, A
 
     Raises DataError where no reader reads it, or it is no table.
     """
-    other = foreign_format(head)
-    if other is not None:
-        raise DataError(other.sentence, file=file)
     for reader in READERS.values():
         form = reader.detect(file, head) if reader.detect else None
         if form is not None:
             return form | ({"topics": list(names)} if reader.topics and names else {})
+    other = foreign_format(head)
+    if other is not None:
+        raise DataError(other.sentence, file=file)
     encoding = _guess_encoding(head, file)
     text = head.decode(encoding, "ignore")
     if is_nmea(file, text.encode("latin-1", "replace")) is not None:

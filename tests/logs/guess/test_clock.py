@@ -19,6 +19,8 @@ from tests.logs.guess.conftest import TABLE, T, log_of, sniff
     ("clock", "unit", "t"),
     [
         ((1000 * T).astype(int), "ms", T),
+        (1000 * T + 0.25, "ms", T + 2.5e-4),
+        (1.7e9 + 240.5 * T, "s", 1.7e9 + 240.5 * T),
         ((1e3 * (1.7e9 + 240 * T)).astype(np.int64), "ms", 1.7e9 + 240 * T),
         ((1e6 * T).astype(np.int64), "us", T),
         ((1e9 * (5.0 + T)).astype(np.int64), "ns", 5.0 + T),
