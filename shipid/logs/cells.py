@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,9 @@ from numpy.typing import NDArray
 
 from shipid.errors import DataError, suggest_name
 from shipid.logs.amounts import is_unit, north_reference, split_amounts
-from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
+from shipid.logs.formats import Format, TableFormat, TextFormat
 from shipid.logs.mapping import (
     OF_SHIP,
-    SIDES,
     degrees_and_minutes,
     degrees_in_parts,
     degrees_in_text,
@@ -26,7 +24,6 @@ from shipid.logs.mapping import (
     rate_of_ais,
 )
 from shipid.logs.readers import in_points
-from shipid.logs.workbook import NOT_CALCULATED
 
 OFF_ONE = 0.05  # of the size of a quaternion from 1: more is no rounding
 
@@ -171,15 +168,10 @@ def parse_numbers(
     if len(bad):
         kind = "angle" if sides == OF_SHIP else "position"
         what = f"no number and no {kind} with {' or '.join(sides)}" if sides else "no number"
-        below = re.sub(r"(?<!\.)60(?!\d)", "59", plain.iloc[bad[0]])  # as receivers write that round up
-        if sides in SIDES.values() and np.isfinite(degrees_in_text(pd.Series([below]), sides)).all():
-            what = "60 minutes or seconds, and the most are 59"
         message = (
             f"{text.iloc[bad[0]]!r} is {what} (column {source!r}; {len(bad)} such rows): "
             "correct it, or list it in [format] missing, or check decimal and thousands"
         )
-        if isinstance(form, SheetFormat) and text.iloc[bad[0]].startswith("="):
-            message = f"{text.iloc[bad[0]]!r} (column {source!r}; {len(bad)} such rows) is {NOT_CALCULATED}"
         raise DataError(message, file=file, path=row_in_words(log, bad[0]))
     return numbers
 

@@ -249,23 +249,5 @@ def _since_midnight(times: pd.Series[Any]) -> Array:
 def over_midnights(since: Array) -> Array:
     """Times of day (N,) [s] as seconds since the first midnight: after one that goes back, the next day has begun."""
     steps = np.diff(since, prepend=since[:1])
-    return np.asarray(since + DAY * np.cumsum((steps < -NEXT_DAY) & ~_hour_back(steps)), dtype=np.float64)
-
-
-def hour_twice(t: Array) -> tuple[int, str] | None:
-    """Row (from 0) of a log at t (N,) [s] that begins an hour anew, and what to do; None if no row does."""
-    steps = np.diff(t)
-    row = int(np.argmax(steps < 0)) + 1 if np.any(steps < 0) else 0
-    if row == 0 or not _hour_back(steps[row - 1]):
-        return None
-    last, first = (
-        format_date(one) if FIRST_DATED_TIME < one < LAST_DATE else format_date(one % DAY)[11:]
-        for one in t[row - 1 : row + 1]
-    )
-    remedy = "write UTC, or in every row the zone that holds there; else sort or split the log"
-    return row, f"time goes back by an hour, from {last} to {first}: is it local time as daylight saving ends? {remedy}"
-
-
-def _hour_back(steps: Any) -> Any:
-    """Whether steps (N,) [s] of a clock go back by an hour, less a pause of up to ten minutes."""
-    return (steps >= -HOUR) & (steps <= NEXT_DAY - HOUR)
+    hour_back = (steps >= -HOUR) & (steps <= NEXT_DAY - HOUR)  # less a pause of up to ten minutes
+    return np.asarray(since + DAY * np.cumsum((steps < -NEXT_DAY) & ~hour_back), dtype=np.float64)

@@ -16,14 +16,13 @@ from shipid.logs.cells import log_column, parse_numbers, row_in_words
 from shipid.logs.dates import (
     date_texts,
     format_moment,
-    hour_twice,
     join_date_and_time,
     parse_dates,
     rollover_words,
     time_texts,
 )
 from shipid.logs.formats import Format
-from shipid.logs.mapping import RESTS, Clock, FileClock, Named, clock_seconds, is_dated, source_columns
+from shipid.logs.mapping import RESTS, Clock, FileClock, Named, clock_seconds, source_columns
 from shipid.logs.repairs import Records
 
 SHORTEST = 1e-4  # s between rows, on average: no recorder of a ship has more than 10 kHz
@@ -32,12 +31,9 @@ SHORTEST = 1e-4  # s between rows, on average: no recorder of a ship has more th
 def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """The time of every row [s]; raises DataError where it is missing or does not rise."""
     t = read_time_column(log, clock, form, file, path)
-    twice = hour_twice(t) if np.isfinite(t).all() and (is_dated(clock.unit) or clock.unit == "hhmmss") else None
-    if twice is not None:
-        raise DataError(twice[1], file=file, path=row_in_words(log, twice[0]))
-    if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
-        return even_instants(t, clock.every, log, file)
-    wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
+    every, steps = clock.every if isinstance(clock, Clock) else None, np.diff(t)
+    wrong = np.flatnonzero(~(steps > 0) if every is None else steps < 0)
+    wrong = wrong if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
     if len(wrong):
         row = int(wrong[0]) + 1
         if not np.isfinite(t[row]):
@@ -47,8 +43,10 @@ def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: 
             what += "remove one of the rows, or set [clock] repeated = 'drop'"
         else:
             back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}{rollover_words(t[row] - t[row - 1])}"
-            what = f"time goes back {back}: sort or split the log"
+            what = f"time goes back {back}: sort or split the log; if it is local time, write UTC"
         raise DataError(what, file=file, path=row_in_words(log, row))
+    if every is not None:
+        return even_instants(t, every, log, file)
     if len(t) > 1 and (t[-1] - t[0]) / (len(t) - 1) < SHORTEST:
         what = f"rows are {(t[-1] - t[0]) / (len(t) - 1):.3g} s apart, as of no ship: is the unit of the clock right?"
         raise DataError(what, file=file, path=f"{path}.unit")

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from shipid.errors import DataError
-from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import MatFormat
 
 ENOUGH_VECTORS = 4  # of one length: clock, position and heading
@@ -27,7 +26,6 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
     """
     from scipy.io import loadmat
 
-    refuse_foreign(file)
     try:
         variables = loadmat(file, simplify_cells=True)
         vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.dates import COMPACT, DAY, HALF_DAY, NEXT_DAY, over_midnights, parse_dates
-from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import LOOKED_AT, NmeaFormat
 from shipid.units import KNOT
 
@@ -193,7 +192,6 @@ def read_nmea(file: Path, form: NmeaFormat, _: object, progress: Callable[[float
     `attrs["unreadable"]` counts lines that are no sentence or fail their checksum.
     progress : called with the share of a long log that has been read, 0 to 1.
     """
-    refuse_foreign(file)
     size, stamped, heard = file.stat().st_size, form.time == "line", _Heard()
     with file.open("rb") as raw, io.TextIOWrapper(raw, encoding="latin-1") as stream:
         checked = any(_CHECKED.search(line) for line in islice(stream, LOOKED_AT))

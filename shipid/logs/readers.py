@@ -76,6 +76,8 @@ def read_log_table(
     if size == 0:
         raise DataError("the file is empty", file=file)
     try:
+        if not (getattr(form, "skip_rows", 0) or READERS[form.kind].topics):
+            refuse_foreign(file)
         table: pd.DataFrame | None = None
         if isinstance(form, TextFormat) and size > LARGE and columns:
             table = _large_text(file, form, {clock, *columns}, progress, size)
@@ -123,8 +125,6 @@ def refuse_power_cut(content: bytes, file: Path) -> None:
 
 def _read_text(file: Path, form: TextFormat, columns: Sequence[str], *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
-    if form.skip_rows == 0:
-        refuse_foreign(file)
     content = file.read_bytes()
     if has_nul(content, form):
         kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, content[:ENOUGH])), None)
@@ -374,13 +374,11 @@ def _start_threads(count: int) -> None:
 
 
 def _read_sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:
-    refuse_foreign(file)
     name = sheets_with_values(file)[0] if form.sheet is None else form.sheet
     return parse_text(sheet_text(file, name), form.text(), file)
 
 
 def _read_parquet(file: Path, _: object, columns: Sequence[str], *__: object) -> pd.DataFrame:
-    refuse_foreign(file)
     try:
         stored = read_arrow(file, columns) if len(columns) > 1 else None
         if stored is None or not {*columns} <= {*stored.column_names}:  # an error says which there are

@@ -6,18 +6,13 @@ python-calamine reads them, `pip install 'shipid[sheet]'`.
 from __future__ import annotations
 
 import csv
-import functools
-import html
 import io
 import re
 import zipfile
-import zlib
-from contextlib import suppress
 from datetime import date, datetime, timedelta
 from datetime import time as time_of_day
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 from shipid.errors import DataError, suggest_name
 
@@ -29,14 +24,6 @@ WIDEST = 10_000  # cells of a line: more is no log
 LARGEST = 2_000_000_000  # bytes of a workbook once unpacked: some twenty million cells
 LARGE_PART, SQUEEZED = 20_000_000, 100  # bytes of a part, and times its packed size: a sheet is squeezed 5 to 30 times
 FIRST_YEAR = 1904  # of dates of a workbook, 1900 or 1904: no log has one
-_NO_VALUE = re.compile(
-    rb"<c ([^>]*)>\s*<f[^>]*?(?:/>|>([^<]*)</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>"
-)  # a cell with a formula alone, as programs write it that do not calculate
-_DAMAGES = (KeyError, StopIteration, RuntimeError, ElementTree.ParseError, zipfile.BadZipFile, zlib.error)
-_PLACE = re.compile(rb'\br="([A-Z]{1,3})(\d+)"')
-_MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
-_LINK = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
-NOT_CALCULATED = "a formula without a stored value: open the workbook in a spreadsheet program and save it"
 _STARTS = re.compile(
     rb"PK\x03\x04(?:.{26}mimetypeapplication/vnd\.oasis\.opendocument\.spreadsheet|"
     rb"(?!.{0,4000}?(?:word|ppt|visio)/[A-Za-z_]).{0,4000}?(?:\[Content_Types\]\.xml|xl/))",
@@ -84,32 +71,9 @@ def sheet_text(file: Path, name: str) -> str:
     first = sheet.start[1] if sheet.start is not None else 0
     lines = io.StringIO()
     writer = csv.writer(lines, delimiter=SEPARATOR, lineterminator="\n")
-    formulas = _formulas_without_value(file, name)
-    for number, row in enumerate(sheet.to_python(skip_empty_area=False)):
-        cells = [_cell_text(cell) for cell in row]
-        for place, formula in formulas.get(number, {}).items():
-            if place < len(cells) and not cells[place]:
-                cells[place] = formula
-        writer.writerow(cells[first:])
+    for row in sheet.to_python(skip_empty_area=False):
+        writer.writerow([_cell_text(cell) for cell in row[first:]])
     return lines.getvalue()
-
-
-def _formulas_without_value(file: Path, name: str) -> dict[int, dict[int, str]]:
-    """Row -> column -> formula of a sheet of an .xlsx file, counted from 0, where no value of it is stored."""
-    found: dict[int, dict[int, str]] = {}
-    with suppress(*_DAMAGES), zipfile.ZipFile(file) as packed:
-        sheets = ElementTree.fromstring(packed.read("xl/workbook.xml")).iter(f"{_MAIN}sheet")
-        link = next((sheet.get(_LINK) for sheet in sheets if sheet.get("name") == name), None)
-        parts = ElementTree.fromstring(packed.read("xl/_rels/workbook.xml.rels"))
-        target = next(part.get("Target", "") for part in parts if part.get("Id") == link)
-        content = packed.read(target.removeprefix("/") if target.startswith("/") else f"xl/{target}")
-        for attributes, formula in _NO_VALUE.findall(content) if b"<f" in content else ():
-            place = _PLACE.search(attributes)
-            if place is not None and b't="str"' not in attributes:  # an empty text is a value
-                column = functools.reduce(lambda number, letter: 26 * number + letter - 64, place[1], 0) - 1
-                text = "=" + " ".join(html.unescape(formula.decode("utf-8", "replace")).split())
-                found.setdefault(int(place[2]) - 1, {})[column] = text
-    return found
 
 
 def _open_workbook(file: Path) -> CalamineWorkbook:

@@ -51,15 +51,3 @@ def test_a_quaternion_that_is_none_is_named() -> None:
     np.testing.assert_allclose(decode_numbers(parts, tuple("xyzw"), "quaternion", log, FILE, "p"), np.pi / 2)
     with pytest.raises(DataError, match="2 in row 1 is the size of what has to be a quaternion"):
         decode_numbers([2 * part for part in parts], tuple("xyzw"), "quaternion", log, FILE, "p")
-
-
-@pytest.mark.parametrize("text", ["51°60.0000'N", "N 51 60.0000", "51 59 60.00 N", "5160.0000N", "160°60'E"])
-def test_sixty_minutes_are_named(text: str) -> None:
-    """As receivers write that round up; the line said that it is no position."""
-    sides = "EW" if text.endswith("E") else "NS"
-    log = pd.DataFrame({"p": [text.replace("60.0", "59.0").replace("60'", "59'"), text]})
-    with pytest.raises(
-        DataError, match=r"is 60 minutes or seconds, and the most are 59 \(column 'p'; 1 such"
-    ) as caught:
-        parse_numbers(log, "p", TextFormat(), Path("log.csv"), "columns.latitude.from", sides)
-    assert caught.value.path == "row 2"

@@ -14,7 +14,6 @@ import pytest
 from openpyxl import Workbook
 
 from shipid.errors import DataError
-from shipid.logs import workbook
 from shipid.logs.formats import SheetFormat, TextFormat
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_mapping
@@ -121,23 +120,6 @@ def test_the_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setitem(sys.modules, "python_calamine", None)
     with pytest.raises(DataError, match=r"pip install 'shipid\[sheet\]', or save its sheet as CSV"):
         recognise_log(file)
-
-
-def test_a_formula_without_a_stored_value_is_no_missing_value(tmp_path: Path) -> None:
-    """As programs write it that do not calculate: the cell was read as empty, and interpolated."""
-    log = BRIDGE.astype(object)
-    place = 1 + list(log).index("rpm")
-    log.loc[6::9, "rpm"] = "=B8 & 2"
-    file = saved(tmp_path / "log.xlsx", [[None, *log], *([None, *row] for row in log.to_numpy().tolist())])
-    assert rows_of(file)[6][place - 1] == "=B8 & 2"
-    draft = draft_mapping(guess(file))
-    sentence = "row 7: '=B8 & 2' (column 'rpm'; "
-    assert sentence in draft
-    assert workbook.NOT_CALCULATED in draft
-    with pytest.raises(DataError, match="a formula without a stored value: open the workbook in a spreadsheet program"):
-        recognise_log(saved(tmp_path / "clock.xlsx", [["time", "x"], *([f"=A{k}", 1.0] for k in range(2, 9))]))
-    says = recognise_log(saved(tmp_path / "all.xlsx", [["time", "speed"], *([k, f"=A{k}"] for k in range(2, 9))])).notes
-    assert any("column 'speed' holds words, not numbers: '=A2' is a formula" in note for note in says)
 
 
 def test_a_part_that_unpacks_as_no_sheet_does_is_refused_at_once(tmp_path: Path) -> None:

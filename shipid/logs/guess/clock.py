@@ -19,8 +19,6 @@ from shipid.logs.dates import (
     DAY,
     DAY_OF,
     DAY_OF_EXCEL,
-    HALF_DAY,
-    HOUR,
     LAST_DATE,
     NEXT_DAY,
     TIME_OF_DAY,
@@ -30,7 +28,6 @@ from shipid.logs.dates import (
     days_with_marks,
     format_date,
     format_moment,
-    hour_twice,
     in_one_number,
     join_date_and_time,
     other_zone,
@@ -42,7 +39,6 @@ from shipid.logs.dates import (
 from shipid.logs.guess.words import NO_VALUE, is_run, name_parts, units_in_name
 from shipid.logs.instants import clock_rounding, even_clock, rows_repeated
 from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, clock_seconds, since_midnight, source_columns, to_si
-from shipid.logs.workbook import NOT_CALCULATED
 
 Rows = NDArray[np.bool_]
 LONG = 1e4  # rows between two runs that have a clock each
@@ -94,7 +90,6 @@ GPS, OF_GPS = 315_964_800, frozenset("gps gnss gpst".split())
 OF_1970 = frozenset("unix epoch posix utc".split())  # words of a clock from 1970
 LEAP, LEAPS = 1_483_228_800, 18  # s since 1970 (UTC): from 2017 on GPS is so many seconds ahead of UTC
 OF_1904 = 2_082_844_800  # s from 1904, from which LabVIEW counts, to 1970
-COUNTERS, LONG_STEP = (2**16, 2**32), 10.0  # numbers of a counter; usual steps that lie over its end, at most
 SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
@@ -250,9 +245,6 @@ def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) ->
     if not any(name in called for name in rising):  # another column that happens to rise is no clock then
         for name, since in times.items():
             if np.isfinite(since).all() and np.any(np.diff(since) < 0):
-                twice = hour_twice(since)
-                if twice is not None:
-                    raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
                 raise DataError(f"no column can be the clock: {name!r} {_clock_fault(since)}", file=file)
         dates = _date_column(table, columns)
         called = [name for name in called if name != dates] or called  # that repeat: the times beside them are at fault
@@ -284,10 +276,9 @@ def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) ->
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
     if called and called[0] in finite:
         first = clock_seconds(first, _unit_of_clock(called[0], first))
-    counted = _counter_rollover(finite[called[0]]) if called and called[0] in finite else ""
     fault = "none rises from row to row"
     if called:
-        fault = f"{called[0]!r} {counted or _unreadable_time(table, called[0], first) or _clock_fault(first)}"
+        fault = f"{called[0]!r} {_unreadable_time(table, called[0], first) or _clock_fault(first)}"
     if called and called[0] in finite and _is_years(called[0], finite[called[0]]):
         fault = f"{called[0]!r} {OF_YEARS.format(finite[called[0]][0])}"
     raise DataError(f"no column can be the clock: {fault}", file=file)
@@ -322,20 +313,6 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
         if firsts and len(alike) > 1:
             others = " or ".join(firsts)
             yield f"{texts.iloc[0]!r} is read as {format_date(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
-    steps = np.diff(t)
-    usual = float(np.median(steps))
-    of_day = t % DAY
-    late = np.flatnonzero((steps >= HALF_DAY) & (steps <= HALF_DAY + NEXT_DAY))
-    if len(late) and t[-1] - t[0] < 3 * DAY and of_day.min() >= HOUR and of_day.max() < HOUR + HALF_DAY:
-        before, after = (format_date(of_day[late[0] + k])[11:] for k in (0, 1))
-        words = f"after {before} comes {after}, read as 12 hours later: has the clock twelve hours without AM and PM?"
-        yield f"{words} Then write 24 hours"
-    for row in np.flatnonzero((steps >= HOUR) & (steps <= HOUR + 3 * usual)):
-        if -t[row] % HOUR <= t[row + 1] - t[row] - HOUR:  # from one full hour to the next
-            before, after = format_date(t[row])[11:], format_date(t[row + 1])[11:]
-            words = f"after {before} comes {after}: is it local time as daylight saving begins, and no pause?"
-            yield f"{words} Then write UTC, or in every row the zone that holds there"
-            return
 
 
 def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
@@ -555,8 +532,6 @@ def _unreadable_time(table: pd.DataFrame, name: str, values: Array) -> str:
     begin = f"holds {text[:40]!r} in row {row + 1}"
     if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
         return f"{begin}: take the mark of thousands out of the log"
-    if text.startswith("="):
-        return f"{begin}, {NOT_CALCULATED}"
     if wrong.all() and re.fullmatch(r"\d{1,2}:\d\d[.,]\d+", text):
         return f"{begin}, without the hour, as Excel shows times: show them as hh:mm:ss.000, and export again"
     if wrong.all():
@@ -574,18 +549,6 @@ def _nearly_rises(values: Array) -> bool:
     return bool(len(steps) > FEWEST * len(values) and np.mean(steps > 0) > NEARLY)
 
 
-def _counter_rollover(values: Array) -> str:
-    """Say where a counter of a few bits (N,) is full and begins again; empty where it is none."""
-    steps = np.diff(values)
-    back = np.flatnonzero(steps < 0)
-    for size in COUNTERS:
-        over = steps[back] + size
-        if len(back) and values.max() < size and np.all((over > 0) & (over < LONG_STEP * np.median(steps))):
-            row = int(back[0]) + 2
-            return f"is a counter that begins again at {size} in row {row}: add {size} from there on, and so each time"
-    return ""
-
-
 def _clock_fault(values: Array) -> str:
     if not np.isfinite(values).any():
         return "holds no numbers and no dates"
@@ -595,7 +558,7 @@ def _clock_fault(values: Array) -> str:
     if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
         before, after = format_moment(values[row - 1]), format_moment(values[row])
         back = f"goes back from {before} to {after}{rollover_words(values[row] - values[row - 1])} in row {row + 1}"
-        return f"{back}: sort the log, or split it there, and join the parts"
+        return f"{back}: sort the log, or split it there, and join the parts; if it is local time, write UTC"
     return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
 
 

@@ -49,7 +49,6 @@ from shipid.logs.readers import (
     refuse_power_cut,
     require_file,
 )
-from shipid.logs.workbook import NOT_CALCULATED
 
 SAMPLE, BLOCK, BLOCKS = 12_000_000, 600_000, 10  # bytes: a longer text is looked at in its head and that many blocks
 SENTINELS = tuple(
@@ -235,8 +234,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
 
 def _as_number(name: str, text: str) -> str:
     """What to do with a column of words whose name says a quantity and whose texts have a number, such as P12.5."""
-    if text.startswith("="):
-        return f": {text[:40]!r} is {NOT_CALCULATED}"
     quantity = any(meaning and score > 0.6 for meaning, score in meaning_scores(name).items())
     remedy = f", such as {text[:40]!r}: write it as a number with a sign"
     return remedy if quantity and re.search(r"\d", text) else ""

@@ -185,8 +185,6 @@ def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path)
             0,
             "'05/08/2024 08:00:00' is read as 2024-08-05: or is it 2024-05-08",
         ),
-        ("2024-05-08 12:59:30", "%I:%M:%S", 0, "after 12:59:59 comes 01:00:00, read as 12 hours later"),
-        ("2024-03-31 01:59:30", "%Y-%m-%d %H:%M:%S", 3600, "after 01:59:59 comes 03:00:00: is it local time"),
         ("2024-05-08 08:00", "%d.%m.%Y %H:%M:%S", 0, ""),
         ("2024-05-14 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
         ("2024-05-05 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
@@ -263,14 +261,6 @@ def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp
     years = [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]
     with pytest.raises(DataError, match=rf"'{name}' is a year with decimals, 2024.3655.*: write a date"):
         sniff(tmp_path, with_clock(name, years))
-
-
-@pytest.mark.parametrize(("size", "step"), [(2**16, 500), (2**32, 500_000)])
-def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: Path) -> None:
-    """As of milliseconds in 16 bits, or microseconds in 32."""
-    values = [(size - 100 * step + 7 + step * k) % size for k in range(600)]
-    with pytest.raises(DataError, match=rf"'time' is a counter that begins again at {size} in row 101: add {size}"):
-        sniff(tmp_path, with_clock("time", values).assign(north=0.0))
 
 
 @pytest.mark.parametrize(
