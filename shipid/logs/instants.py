@@ -88,9 +88,6 @@ def _bad_time(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path,
     if any(pd.isna(cell) or not str(cell).strip() for cell in cells):
         return "no time here: remove the row"
     text = " ".join(str(cell).strip() for cell in cells)
-    if len(times) > 1 or len(days) > 1:
-        said = " and ".join(filter(None, (", ".join(map(repr, days)), ", ".join(map(repr, times)))))
-        return f"{text!r} is no date or time of day, as {said} have to say: correct it, or list them in their order"
     if clock.unit != "date":
         return f"{text} is no time of day, hours, minutes and seconds as in 123005.5: correct it, or write another unit"
     if np.isfinite(parse_dates(pd.Series([text]))[0]):

@@ -37,7 +37,7 @@ from shipid.logs.dates import (
     time_texts,
 )
 from shipid.logs.guess.words import NO_VALUE, is_run, name_parts, units_in_name
-from shipid.logs.instants import clock_rounding, even_clock, rows_repeated
+from shipid.logs.instants import SHORTEST, clock_rounding, even_clock, rows_repeated
 from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, clock_seconds, since_midnight, source_columns, to_si
 
 Rows = NDArray[np.bool_]
@@ -77,20 +77,17 @@ FIELDS = {
 }
 """Field of a date or time in columns -> words for it, and its least and largest number."""
 YEARS = 1990.0, 2050.0  # of a log
-OF_YEARS = "is a year with decimals, {:.12g}: write a date, 2024-05-14 08:00:00, or seconds"
 FINE = {"ns": 1e8, "us": 1e5}
 """Unit of a clock -> least step of whole numbers in it: 0.1 s."""
-DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in {**EPOCHS, "d": 0.0}.items()}
-"""Unit of a clock in days -> its numbers of 1990 and 2050, `d` since 1970. Those of Excel from 2031 and
+DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in EPOCHS.items()}
+"""Unit of a clock in days -> its numbers of 1990 and 2050. Those of Excel from 2031 and
 modified Julian dates to 2008 are the same numbers."""
-TICKS = {11_644_473_600: "1601, as Windows does", 62_135_596_800: "the year 1, as .NET does"}
-"""Seconds from the begin of a clock of ticks of 100 ns to 1970 -> who counts so."""
 GPS, OF_GPS = 315_964_800, frozenset("gps gnss gpst".split())
 """Seconds from 1970 to 6 January 1980, from which GPS counts, and words of a clock that may."""
 OF_1970 = frozenset("unix epoch posix utc".split())  # words of a clock from 1970
 LEAP, LEAPS = 1_483_228_800, 18  # s since 1970 (UTC): from 2017 on GPS is so many seconds ahead of UTC
+RECENT, LATEST = (9.46e8, 2.53e9), 5e9  # s since 1970: from 2000 to 2050, and of no log
 OF_1904 = 2_082_844_800  # s from 1904, from which LabVIEW counts, to 1970
-SHORT_YEAR = 2e-6  # years, a minute: no clock of a ship has steps of as many seconds, or hours, without a unit
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 
@@ -279,8 +276,6 @@ def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) ->
     fault = "none rises from row to row"
     if called:
         fault = f"{called[0]!r} {_unreadable_time(table, called[0], first) or _clock_fault(first)}"
-    if called and called[0] in finite and _is_years(called[0], finite[called[0]]):
-        fault = f"{called[0]!r} {OF_YEARS.format(finite[called[0]][0])}"
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
@@ -394,22 +389,13 @@ def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tu
     if values.min() > 1e9 and _is_time_of_day(values % 1e6):
         message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
         raise DataError(f"no column can be the clock: {message}", file=file)
-    if _is_years(name, values):
-        message = f"{name!r} {OF_YEARS.format(values[0])}"
-        raise DataError(f"no column can be the clock: {message}", file=file)
-    for epoch, what in TICKS.items():
-        if DATES["d"][0] < (values[0] / 1e7 - epoch) / DAY < DATES["d"][1] and np.median(np.diff(values)) >= 1e5:
-            message = f"{name!r} counts 100 ns since {what}: write seconds since 1970, value / 1e7 - {epoch}"
-            raise DataError(f"no column can be the clock: {message}", file=file)
     unit = _unit_of_clock(name, values)
-    return unit, clock_seconds(values, unit)
-
-
-def _is_years(name: str, values: Array) -> bool:
-    """Whether a clock is in years with decimals: its name says so, or it says no unit and a minute is no step of it."""
-    inside = YEARS[0] < values[0] < YEARS[1] and np.ptp(values) < 1.0 and np.any(values % 1)
-    said = {*FIELDS["year"][0].split(), "years"} & {*name_parts(name)}
-    return bool(inside and (said or (not units_in_name(name) and float(np.median(np.diff(values))) < SHORT_YEAR)))
+    t = clock_seconds(values, unit)
+    step = float(np.ptp(t)) / max(1, len(t) - 1)
+    if 0.0 < step < SHORTEST or t[0] > LATEST:
+        message = f"{name!r}, read in {unit}, begins at {t[0]:.12g} s, with rows {step:.3g} s apart"
+        raise DataError(f"no column can be the clock: {message}: write dates, or seconds since 1970", file=file)
+    return unit, t
 
 
 def _unit_of_clock(name: str, values: Array) -> str:
@@ -435,9 +421,7 @@ def _unit_of_clock(name: str, values: Array) -> str:
         return "d"  # the day of the year
     if _is_time_of_day(values):
         return "hhmmss"
-    since = [
-        unit for unit in ("s", "ms", "us", "ns") if DATES["d"][0] < values[0] * to_si(unit, "t") / DAY < DATES["d"][1]
-    ]
+    since = [unit for unit in ("s", "ms", "us", "ns") if RECENT[0] < values[0] * to_si(unit, "t") < RECENT[1]]
     if since and (since != ["s"] or ends):  # however far apart; seconds without the name may be milliseconds of weeks
         return since[0]
     if len(steps) and np.median(steps) >= 20 and not (since and np.any(values % 1)):
@@ -532,8 +516,6 @@ def _unreadable_time(table: pd.DataFrame, name: str, values: Array) -> str:
     begin = f"holds {text[:40]!r} in row {row + 1}"
     if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
         return f"{begin}: take the mark of thousands out of the log"
-    if wrong.all() and re.fullmatch(r"\d{1,2}:\d\d[.,]\d+", text):
-        return f"{begin}, without the hour, as Excel shows times: show them as hh:mm:ss.000, and export again"
     if wrong.all():
         return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
     if np.isfinite(parse_dates(pd.Series([text]))[0]) and not np.isfinite(pd.to_numeric(text, errors="coerce")):

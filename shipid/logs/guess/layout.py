@@ -6,7 +6,6 @@ import csv
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from shipid.errors import DataError
 from shipid.logs.amounts import is_amount
 from shipid.logs.dates import DAY_OF, TIME_OF_DAY
 from shipid.logs.foreign import foreign_format
-from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
+from shipid.logs.formats import LOOKED_AT, SheetFormat
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.words import NO_VALUE, known_words, meaning_scores
 from shipid.logs.mapping import is_position
@@ -326,24 +325,3 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def table_below(lines: str, form: TextFormat, missing: Iterable[str]) -> tuple[int, str] | None:
-    """Number, from 1, and first text of the line that begins another table; None where none does."""
-    empty, rows, header = False, 0, [""]
-    last: tuple[int, list[str]] = 0, []
-    for number, line in enumerate(lines.splitlines(), 1):
-        row = [cell for cell in split_cells(line, form.separator) if cell and cell not in missing]
-        if number > form.skip_rows and not row:
-            empty = True
-        elif number > form.skip_rows:
-            share = _number_share(row, form.decimal, form.thousands)
-            words = share == 0.0 and not any(re.match(rf"{TIME_OF_DAY}|{DAY_OF}", cell) for cell in row)
-            if empty and words and rows > 1:
-                return number, row[0]
-            if share > 0.0 and len(row) == len(last[1]) > 1 and rows > 1:
-                return last[0], last[1][0]
-            header = row if header == [""] else header
-            last = (number, row) if words and row != header else (0, [])
-            empty, rows = False, rows + (share > 0.0)
-    return None

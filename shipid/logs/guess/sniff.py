@@ -16,7 +16,7 @@ from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, split_amounts
 from shipid.logs.cells import OFF_ONE
-from shipid.logs.formats import LOOKED_AT, SheetFormat, TableFormat, TextFormat
+from shipid.logs.formats import LOOKED_AT, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
     are_whole,
@@ -28,7 +28,7 @@ from shipid.logs.guess.clock import (
     other_clocks,
     zone_questions,
 )
-from shipid.logs.guess.layout import format_of_sheet, guess_format, table_below
+from shipid.logs.guess.layout import format_of_sheet, guess_format
 from shipid.logs.guess.words import NO_VALUE, is_run, meaning_scores, name_parts, units_in_name
 from shipid.logs.mapping import (
     SIDES,
@@ -183,15 +183,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         lost = next(filter(is_clock, other), None)
         if lost is not None and not any(map(is_clock, columns)):
             raise DataError(f"no column can be the clock: {lost!r} is {other[lost]}", file=file) from None
-        below = table_below(lines, model.text(), form.get("missing", ())) if isinstance(model, TableFormat) else None
-        if below is None or sampled:
-            raise
-        place, apart = ("row", "sheet") if isinstance(model, SheetFormat) else ("line", "file")
-        message = (
-            f"another table begins below the log, with {below[1][:40]!r}: move it to another {apart}. Its columns "
-        )
-        message += "can be joined to these ([file.<name>] of a mapping), and other runs can be files of one folder"
-        raise DataError(message, file=file, path=f"{place} {below[0]}") from None
+        raise
     columns = {name: values[once] for name, values in (columns | made).items()}
     named = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
     named |= {part for parts in in_parts.values() for part in parts}

@@ -180,25 +180,6 @@ def test_names_in_several_lines(above: str, names: list[str] | None, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    "below", [[["Summary"], ["mean", "4.5"]], [["run", "start", "end"], ["1", "0", "300"], ["2", "300", "600"]]]
-)
-@pytest.mark.parametrize("kind", ["csv", "xlsx"])
-def test_a_table_below_the_log_is_named_with_its_line(below: list[list[str]], kind: str, tmp_path: Path) -> None:
-    """Before, the remedy was to remove a line, with the number of a row that no editor shows."""
-    log = [line.split(",") for line in text().splitlines()]
-    frame = pd.DataFrame([[*row, "", "", ""][:3] for row in [*log, [], [], *below]])
-    file = tmp_path / f"log.{kind}"
-    if kind == "csv":
-        frame.to_csv(file, index=False, header=False)
-    else:
-        frame.to_excel(file, index=False, header=False)
-    place, other = ("line", "file") if kind == "csv" else ("row", "sheet")
-    begins = f"{place} {len(log) + 3}: another table begins below the log, with '{below[0][0]}': .* another {other}"
-    with pytest.raises(DataError, match=begins):
-        recognise_log(file)
-
-
-@pytest.mark.parametrize(
     ("decimal", "mark", "separator"),
     [
         (".", ",", ";"),

@@ -49,7 +49,7 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
         ),
         (
             text(table=TABLE.assign(time=SUMMER_TIME_ENDS)).encode(),
-            "row 11: time goes back by an hour, from 2025-10-26 02:59:59 to 2025-10-26 02:00:00",
+            "goes back from 2025-10-26 02:59:59 UTC to 2025-10-26 02:00:00 UTC in row 11",
         ),
         (
             text(table=TABLE.assign(time=TABLE["time"].where(T != 1.0), N=1.0, psi=1.0)).encode(),
