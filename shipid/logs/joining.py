@@ -13,6 +13,7 @@ import pandas as pd
 from shipid.data.dataset import FIRST_DATED_TIME, Dataset, units_of_columns
 from shipid.errors import DataError
 from shipid.logs.frames import PARALLEL, meridian_convergence
+from shipid.logs.importing import distinct_names
 from shipid.units import percent_text
 
 FARTHEST = 1e5  # m between origins
@@ -106,15 +107,9 @@ def _joined_names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Pa
     runs = [run for one in datasets.values() for run in one.runs]
     if len(set(runs)) == len(runs):
         return {file: {run: run for run in one.runs} for file, one in datasets.items()}
-    stems = [file.stem for file in datasets]
-    if len(set(stems)) < len(stems):
-        stems = [f"{stem} {number}" for number, stem in enumerate(stems, 1)]
-    names = {f"{stem} {run}" for stem, one in zip(stems, datasets.values(), strict=True) for run in one.runs}
-    if len(names) < len(runs):
-        stems = [f"{number} {stem}" for number, stem in enumerate(stems, 1)]  # "day" with "1 a", and "day 1" with "a"
-    notes.append(f"runs of one name in several files: names begin with {', '.join(stems)}")
-    named = zip(stems, datasets.items(), strict=True)
-    return {file: {run: f"{stem} {run}" for run in one.runs} for stem, (file, one) in named}
+    notes.append(f"runs of one name in several files: names begin with {', '.join(file.stem for file in datasets)}")
+    distinct = iter(distinct_names(f"{file.stem} {run}" for file, one in datasets.items() for run in one.runs))
+    return {file: {run: next(distinct) for run in one.runs} for file, one in datasets.items()}
 
 
 def _common_clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dict[Path, float]]:

@@ -77,7 +77,7 @@ def test_runs_of_one_name_are_told_apart_by_their_files() -> None:
     assert whole.metadata["manoeuvres"] == {"day 0 a": "zigzag", "day 1 a": "zigzag"}
     assert "names begin with day 0, day 1" in notes[0]
     same = join_datasets({Path("one/log.parquet"): recording(1), Path("two/log.parquet"): recording(2, begin=900.0)})[0]
-    assert same.runs == ["log 1 a", "log 1 b", "log 2 a", "log 2 b"]
+    assert same.runs == ["log a", "log b", "log a (2)", "log b (2)"]
 
 
 def test_positions_have_the_first_origin() -> None:

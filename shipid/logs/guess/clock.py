@@ -76,7 +76,6 @@ FIELDS = {
     "second": ("second seconds sec ss s sekunde seconde secondo segundo sekund sek", 0.0, 60.0),
 }
 """Field of a date or time in columns -> words for it, and its least and largest number."""
-YEARS = 1990.0, 2050.0  # of a log
 FINE = {"ns": 1e8, "us": 1e5}
 """Unit of a clock -> least step of whole numbers in it: 0.1 s."""
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in EPOCHS.items()}
@@ -101,14 +100,6 @@ def are_whole(values: Array, most: float) -> bool:
 def _date_fields(columns: dict[str, Array]) -> dict[str, str]:
     """Field of a date or time -> column of whole numbers that is called so: year, month, day, hour, minute, second."""
     found: dict[str, str] = {}
-    names, order = [*columns], [one for one in FIELDS if one != "day of the year"]
-    for place in range(len(names) - len(order) + 1 if all(map(str.isdecimal, names)) else 0):
-        six = dict(zip(order, names[place:], strict=False))  # as datevec of MATLAB writes
-        limits = {**FIELDS, "year": ("", *YEARS)}
-        parts = [np.floor(columns[name]) if one == "second" else columns[name] for one, name in six.items()]
-        inside = zip(parts, order, strict=True)
-        if all(are_whole(part, limits[one][2]) and np.min(part) >= limits[one][1] for part, one in inside):
-            return six
     for name, values in columns.items():
         word = (name_parts(name) or ("",))[-1]
         called = [one for one, (words, _, _) in FIELDS.items() if word in words.split() and one not in found]
