@@ -40,6 +40,7 @@ SIGNALS_LATE = {
     "r": ("yaw rate", "heading"),
 }
 """Signal of a diagnosis -> its name, and that of the signal that is late where it is early."""
+TURNED = np.radians(0.5)  # of a track against velocities, at least
 CLEAR = 0.008  # rad: standard error of a heading that is off, at most
 ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
@@ -176,6 +177,10 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             sentence = f"the heading is {1 / size[0]:.4f} times the integral of the yaw rate"
             repair = {"kind": "scale", "columns": ["r"], "factor": round(1 / size[0], 4)}
             _find_cause(state, "factor", sentence, found, repair)
+        elif key == "sensor psi bias":
+            path = np.asarray(path * np.exp(-1j * size[0]))
+            if abs(size[0]) > TURNED:
+                _ask_about_north(state, -size[0], float(np.ptp(found.interval[0])) / 2)
         elif key == "velocity through water":
             flow = complex(*size[:2])
             words = f"a current of {abs(flow):.2g} m/s towards {np.degrees(np.angle(flow)) % 360.0:.0f} deg"
@@ -198,6 +203,20 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             words = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
             state.find("position jitter", (), 0.8, f"{words}: take the path of the velocities")
     return path
+
+
+def _ask_about_north(state: State, angle: float, error: float) -> None:
+    """Ask what is off where the track is turned by an angle [rad] against velocities over ground."""
+    columns = {one.name: one for one in state.suggestions}
+    name = "course" if "course" in columns else "psi"
+    of = columns[name if name == "course" else "u"]
+    remedy = f"write offset = {angle / to_si(columns[name].unit, 'psi'):.4g} ({columns[name].unit}) for {name}"
+    what = "is the heading off, or the north of the positions another"
+    if name == "course" or "frame" in of.extra:
+        what = "is their north another than that of the positions, as that of a map or of a compass"
+        remedy = "turn the positions, or these" if name == "psi" else f"{remedy}, and for psi, too, if it counts so"
+    turned = f"the track is turned by {np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg against {of.source!r}"
+    state.ask(("psi", "course", "u", "v"), f"{turned}: {what}? Then {remedy}")
 
 
 def _late_path(state: State, path: Complex, seconds: float) -> Complex:
