@@ -48,9 +48,9 @@ def _ask_about_scales(state: State, edges: list[int], parts: list[Windows], file
     sources, change = {one.name: one.source for one in state.suggestions}, state.chosen.change
     relations: list[tuple[tuple[str, ...], list[str], Complex, Complex]] = []
     if state.velocity is not None:
-        about = tuple(name for name in ("u", "v", "speed") if name in sources)
-        columns = [sources[name] for name in about]
-        relations.append((about, columns, change(state.position), evidence.integrate_rate(state.t, state.velocity)))
+        of = [name for name in ("u", "v", "speed") if name in sources]
+        path = evidence.integrate_rate(state.t, state.velocity)
+        relations.append(((*of,), [sources[name] for name in of], change(state.position), path))
     for name in [sources["r"]] if "r" in sources else state.called("r")[:1]:
         ran = evidence.integrate_rate(state.t, state.columns[name])
         relations.append((("r",), [name], change(state.psi), ran))

@@ -18,19 +18,11 @@ from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import LogTable
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
-MEASURED = ("speed", "u", "v", "r")
-LEVELS, BESIDE = 30, 3  # values that a signal has at least; of them beside a limit
-PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as beside it; visits
-HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, from which on the ship rests
-TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
-VISITS = 6  # to its largest value, before a signal counts as clipped
-ORDERED = 20  # values of a shaft that is held at what was ordered, the largest among them
 OFFSET, JITTER = 0.02, 0.07  # rad, share of the way: less is no finding
 OF_PATH = ("lever arm", "late position", "late velocity", "speed through water")
 SIGNALS_LATE = {
@@ -55,42 +47,11 @@ NO_HEADING = 0.4  # confidence of a heading that is a course
 HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
 
 
-def _held_positions(state: State) -> None:
-    """Report a position that repeats for some rows, again and again, while the heading or the yaw rate goes on."""
-    places = [one.source for one in state.suggestions if one.name in POSITIONS]
-    others = [one.source for one in state.suggestions if one.name in ("psi", "r")]
-    if len(places) < 2 or not others:
-        return
-    steps, moves = (np.stack([np.diff(state.columns[name]) != 0 for name in names]) for names in (places, others))
-    if np.mean(steps.all(axis=0)) < TOGETHER * np.mean(steps.any(axis=0)):
-        return  # rounded: each repeats for itself
-    edges = evidence.row_spans(np.all(~steps, axis=0))
-    lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before
-    moved = np.append(0, np.cumsum(moves.any(axis=0)))
-    lengths = lengths[moved[edges[:, 1]] > moved[edges[:, 0]]]
-    some = lengths[lengths <= STAY * np.median(lengths)] if len(lengths) else lengths  # longer: a ship at rest
-    share = float(some.sum()) / len(state.t)
-    if share > HELD_SHARE:
-        late = float(np.mean(some)) / 2 * float(np.median(np.diff(state.t)))
-        state.find(
-            "held positions",
-            tuple(places),
-            0.9,
-            f"in {100 * share:.0f} % of the rows the position repeats the row before while the heading goes on: a "
-            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap",
-        )
-
-
 def defects_of_rows(state: State, sniffed: LogTable) -> None:
-    """Report repeated rows, values that stop at a limit, holes, missing values, and a log that was interpolated."""
+    """Report holes, missing values, and a log that was interpolated."""
     sources = [column.source for column in state.suggestions if column.name in ("north", "east", "latitude", "u", "r")]
     moving = [name for name in sources if np.ptp(state.columns[name]) > 0]
     if moving:
-        same = np.all([np.diff(state.columns[name]) == 0 for name in moving], axis=0)
-        if same.mean() > 0.02:
-            state.find(
-                "frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before"
-            )
         share = float(np.median([evidence.interpolated_share(state.columns[name]) for name in moving]))
         if share > 0.2:
             state.find(
@@ -99,26 +60,6 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
                 0.9,
                 f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated",
             )
-    _held_positions(state)
-    for column in state.suggestions:
-        values = state.columns[column.source]
-        if is_shaft(column.name):
-            top = float(np.mean(values == values.max()))
-            ordered = len(np.unique(values)) <= ORDERED
-            if 0.05 < top < 0.9 and evidence.maximum_visits(values) >= VISITS and not ordered:
-                rows = f"{100 * top:.0f} % of the rows of {column.source!r}"
-                state.find("clipped", (column.source,), 0.7, f"{rows} have exactly the largest value, {values.max():g}")
-        elif column.name in MEASURED:
-            limits = [limit for limit in (values.max(), values.min()) if _piles_up(values, float(limit))]
-            if limits:
-                most = ", ".join(f"{limit:g}" for limit in limits)
-                share = float(np.mean(np.isin(values, limits)))
-                state.find(
-                    "clipped",
-                    (column.source,),
-                    0.7,
-                    f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it",
-                )
     steps = np.diff(sniffed.t)
     holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
     holes = max(holes - sniffed.seams, 0)
@@ -136,21 +77,11 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
         )
 
 
-def _piles_up(values: Array, limit: float) -> bool:
-    near = np.abs(values - limit)
-    levels = np.unique(near)
-    if limit == 0 or len(levels) < LEVELS:
-        return False
-    at = near == 0
-    beside = np.mean((near > 0) & (near <= levels[BESIDE]))
-    return bool(PILE < at.mean() < 0.9 and at.mean() > ABOVE * beside and evidence.maximum_visits(-near) >= RETURNS)
-
-
 def defects_of_motion(state: State) -> None:
     """Report contradictions between position, heading, velocity and yaw rate."""
     course = _ask_if_course(state)
     if state.velocity is None or state.body is None:
-        _report_position_jumps(state, _own_path(state), spikes=False)
+        _report_position_jumps(state, _own_path(state))
         _report_heading_offset(state)
         return
     _ask_for_set_clock(state)
@@ -324,8 +255,8 @@ def _ask_for_set_clock(state: State) -> None:
         )
 
 
-def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> None:
-    """Report where positions leave a path (N,) [m]; of velocities also where they come back: `spikes`."""
+def _report_position_jumps(state: State, path: Complex) -> None:
+    """Report where positions leave a path (N,) [m] and do not come back."""
     unit = to_si(state.clock_unit, "t")
     lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
     places = [
@@ -334,8 +265,6 @@ def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> 
         if not any(unit * start <= place[1] and place[0] <= unit * end for start, end in lost)
     ]
     stay = [place for place in places if place[2] > 5.0]
-    back = [place for place in places if place[2] <= 5.0 and spikes]
-    repair: dict[str, Any]
     if stay and state.joined:
         count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
         state.find(
@@ -350,10 +279,6 @@ def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> 
         )
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
-    if back and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
-        words = ", ".join(clock_text(state, (start + end) / 2) for start, end, _ in back[:6])
-        words = f"at {len(back)} place{'s' * (len(back) > 1)} of the files" if state.joined else f"near {words}"
-        state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 
 def clock_text(state: State, t: float) -> str:
@@ -363,23 +288,9 @@ def clock_text(state: State, t: float) -> str:
 
 def _report_heading_offset(state: State) -> None:
     angle, error, current = _off_on_all_courses(state)
-    if error < CLEAR:
+    if error < CLEAR and np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # of more it is a drift, or another zero
         why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
         why += f", beside a steady current of {abs(current):.2g} m/s: heading off, positions in turned axes, or wind"
-    elif state.body is None:
-        return
-    else:
-        r = state.r if state.r is not None else np.gradient(state.psi, state.t)
-        rows = evidence.straight_rows(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
-        if rows.mean() < 0.02:
-            return
-        # median of arg(u + i v), where a ship has no drift angle
-        drift = np.angle(-state.body[rows] if state.astern else state.body[rows])
-        angle = float(np.median(drift))
-        error = float(np.median(np.abs(drift - angle))) / 2  # so that the limit below is 1.5 of this scatter
-        why = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
-        why += ": heading off, or wind and current"
-    if np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # one of more is a drift, or the zero of the heading
         repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
         state.find("heading offset", ("psi",), 0.6, why, repair)
 

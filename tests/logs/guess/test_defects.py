@@ -62,16 +62,6 @@ def turned(frame: pd.DataFrame, angle: float) -> pd.DataFrame:
 
 
 DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
-    "frozen rows": (
-        lambda frame: frame.assign(
-            **{
-                name: frame[name].where((frame.index // 20) % 4 != 0).ffill().bfill()
-                for name in frame
-                if name != "time"
-            }
-        ),
-        r"2\d % of the rows repeat",
-    ),
     "holes in time": (lambda frame: frame.drop(range(500, 540)), r"1 steps are more than 3 times"),
     "missing values": (lambda frame: frame.assign(u=frame["u"].where(frame.index % 50 != 7)), r"no value in 'u'"),
     "lever arm": (lambda frame: moved(frame, 9.0, -3.0), r"\+(8\.9|9\.\d) m forward and -(2\.9|3\.\d) m to starboard"),
