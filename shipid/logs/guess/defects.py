@@ -332,30 +332,29 @@ def _row_times(state: State, rows: NDArray[np.intp]) -> str:
 
 def take_lost_fixes(state: State) -> None:
     """Interpolate, in place, positions that receivers write without a fix, such as 0 N, far from those about them."""
-    pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude") if a != b]
-    for north, east in pairs[:1]:
-        lost = {name: lost_fixes(state.columns[name]) for name in (north, east)}
-        rows = lost[north] | lost[east]
-        if not 0 < rows.mean() < LOST:
-            continue
-        said = []
-        for name, hit in lost.items():
-            if hit.any():
-                fills = " or ".join(f"{value:g}" for value in np.unique(state.columns[name][hit]))
-                said.append((name, fills, _row_times(state, evidence.row_spans(hit)[:, 0])))
-                state.columns[name] = np.interp(state.t, state.t[~hit], state.columns[name][~hit])
-        step, unit = float(np.median(np.diff(state.t))), to_si(state.clock_unit, "t")
-        t = np.concatenate([[state.t[0] - step], state.t, [state.t[-1] + step]])
-        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in evidence.row_spans(rows)]
-        if len(said) > 1 and said[0][1:] == said[1][1:]:
-            words = f"{north!r} and {east!r} are {said[0][1]} {said[0][2]}"
-        else:
-            words = ", and ".join(f"{name!r} is {fills} {times}" for name, fills, times in said)
-        sentence = f"{words}: the receiver had no fix"
-        if state.joined:
-            state.ask(("latitude", "longitude"), f"{sentence}. Leave these cells empty, and draft again")
-        repair = None if state.joined else {"kind": "break", "intervals": breaks}
-        state.find("no fix", tuple(name for name, hit in lost.items() if hit.any()), 0.95, sentence, repair)
+    for names in [(a, b) for a in state.called("latitude") for b in state.called("longitude") if a != b][:1]:
+        lost = {name: lost_fixes(state.columns[name]) for name in names}
+        if 0 < np.mean(lost[names[0]] | lost[names[1]]) < LOST:
+            for name in (name for name in names if lost[name].any()):
+                fills = " or ".join(f"{value:g}" for value in np.unique(state.columns[name][lost[name]]))
+                _take_out(
+                    state, name, lost[name], "no fix", fills, "the receiver had no fix", ("latitude", "longitude")
+                )
+
+
+def _take_out(
+    state: State, name: str, rows: NDArray[np.bool_], kind: str, fills: str, why: str, about: tuple[str, ...]
+) -> None:
+    """Interpolate rows (N,) of a column that hold no value, and report them; the repair breaks the run there."""
+    t, unit, step = state.t, to_si(state.clock_unit, "t"), float(np.median(np.diff(state.t)))
+    spans = evidence.row_spans(rows)
+    state.columns[name] = np.interp(t, t[~rows], state.columns[name][~rows])
+    sentence = f"{name!r} is {fills} {_row_times(state, spans[:, 0])}: {why}"
+    if state.joined:
+        state.ask(about, f"{sentence}. Leave these cells empty, and draft again")
+    around = np.concatenate([[t[0] - step], t, [t[-1] + step]])
+    breaks = [[around[first] / unit, around[end + 1] / unit] for first, end in spans]
+    state.find(kind, (name,), 0.95, sentence, None if state.joined else {"kind": "break", "intervals": breaks})
 
 
 def lost_fixes(values: Array) -> NDArray[np.bool_]:
@@ -375,8 +374,7 @@ def lost_fixes(values: Array) -> NDArray[np.bool_]:
 
 def take_zeros(state: State) -> None:
     """Interpolate, in place, a speed or heading of 0 between rows far from it: no ship stops or turns in one row."""
-    t, unit = state.t, to_si(state.clock_unit, "t")
-    step = float(np.median(np.diff(t)))
+    t, step = state.t, float(np.median(np.diff(state.t)))
     speeds = [*state.called("speed"), *state.called("u")]
     for name in dict.fromkeys([*speeds, *state.called("psi"), *state.called("course")]):
         values, known = state.columns[name], state.columns[name] != 0.0
@@ -394,18 +392,14 @@ def take_zeros(state: State) -> None:
         kept = np.ones(len(t), dtype=bool)
         kept[rows] = False
         smallest = float(min(min(size[a - 1], size[b]) for a, b in inside))
-        state.columns[name] = np.interp(t, t[kept], values[kept])
         most = OFTEN / step if name in speeds else 2
         if max(b - a for a, b in inside) <= most and name not in state.called("course"):
+            state.columns[name] = np.interp(t, t[kept], values[kept])
             before, least = state.spikes.get(name, (rows, smallest))
             state.spikes[name] = np.union1d(rows, before), min(smallest, least)
             continue
-        starts = np.array([a for a, _ in inside], dtype=np.intp)
-        sentence = f"{name!r} is 0 {_row_times(state, starts)} between values far from it: it was written for no value"
-        if state.joined:
-            state.ask(("u", "v", "psi", "speed", "course"), f"{sentence}. Leave these cells empty, and draft again")
-        breaks = [[t[a - 1] / unit, t[b] / unit] for a, b in inside]
-        state.find("zeros", (name,), 0.9, sentence, None if state.joined else {"kind": "break", "intervals": breaks})
+        why = "between values far from it, it was written for no value"
+        _take_out(state, name, ~kept, "zeros", "0", why, ("u", "v", "psi", "speed", "course"))
 
 
 def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[np.intp], float]]:
