@@ -16,7 +16,7 @@ from shipid.arguments import as_names, as_path, check_choice, check_class
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
-from shipid.logs.guess.changes import ask_about_files, ask_for_changes
+from shipid.logs.guess.changes import ask_for_changes
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Clue, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
@@ -143,8 +143,7 @@ def guess(
     find_stuck(state)
     report_command_faults(state, sniffed)
     defects_of_spikes(state)
-    ask_for_changes(state)
-    ask_about_files(state, PAUSE)
+    ask_for_changes(state, PAUSE)
     defects_of_motion(state)
     left = unused_reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)

@@ -30,6 +30,7 @@ TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
 FASTEST, GEARED = 200.0, 5.0  # rev/s: no shaft is faster; an engine that is faster usually has a gear
 PULSES = (700.0, 2300.0)  # us: what a servo takes is about 1500, from 1000 to 2000
+SERVO, OFF_SERVO = 1500.0, 100.0  # us: its middle, and how far a stopped screw may be from it
 SHARES = {
     ("per cent", "%", "pct", "percent", "prozent"): 100.0,
     ("per mille", "‰", "permille", "promille", "permil"): 1000.0,
@@ -387,7 +388,8 @@ def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
         words = f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor"
         state.ask(("n",), words)
         if not all(why for _, why in zeros.values()):
-            words = f"which value of {both} is a stopped screw? 0 is a guess: write offset = -factor * value"
+            guesses = " and ".join(f"{zero:g}" for zero, _ in zeros.values())
+            words = f"which value of {both} is a stopped screw? {guesses} is a guess: write offset = -factor * value"
             state.ask(("n",), words)
     if not by_name:
         state.ask(("n",), f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard")
@@ -409,8 +411,9 @@ def _neutral_value(state: State, name: str) -> tuple[float, str]:
     still = values[state.chosen.first[speed < 0.05 * np.quantile(speed, 0.9)]]
     usual = float(np.median(still)) if len(still) >= 5 else 0.0
     if len(still) >= 5 and float(np.median(np.abs(still - usual))) < 0.02 * float(np.ptp(values)):
-        return usual, f"; {usual:g} while the ship is at rest"
-    return (1500.0, "; 1500 is the middle of a servo") if _are_pulses(values) else (0.0, "")
+        other = _are_pulses(values) and abs(usual - SERVO) > OFF_SERVO  # the ship may stop for a moment as it turns
+        return usual, "" if other else f"; {usual:g} while the ship is at rest"
+    return (SERVO, f"; {SERVO:g} is the middle of a servo") if _are_pulses(values) else (0.0, "")
 
 
 def _are_pulses(values: Array) -> bool:

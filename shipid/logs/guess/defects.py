@@ -18,19 +18,11 @@ from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import LogTable
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import is_shaft
 
 POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
-MEASURED = ("speed", "u", "v", "r")
-LEVELS, BESIDE = 30, 3  # values that a signal has at least; of them beside a limit
-PILE, ABOVE, RETURNS = 0.03, 4.0, 3  # of the rows, at a limit; times as many as beside it; visits
-HELD_SHARE, STAY = 0.2, 3.0  # of the rows; times the usual repeats in a row, from which on the ship rests
-TOGETHER = 0.5  # share of the steps of a held position that both of its columns make, at least
-VISITS = 6  # to its largest value, before a signal counts as clipped
-ORDERED = 20  # values of a shaft that is held at what was ordered, the largest among them
 OFFSET, JITTER = 0.02, 0.07  # rad, share of the way: less is no finding
 OF_PATH = ("lever arm", "late position", "late velocity", "speed through water")
 SIGNALS_LATE = {
@@ -40,6 +32,7 @@ SIGNALS_LATE = {
     "r": ("yaw rate", "heading"),
 }
 """Signal of a diagnosis -> its name, and that of the signal that is late where it is early."""
+TURNED = np.radians(0.5)  # of a track against velocities, at least
 CLEAR = 0.008  # rad: standard error of a heading that is off, at most
 ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
@@ -54,42 +47,11 @@ NO_HEADING = 0.4  # confidence of a heading that is a course
 HALF, AWAY = 0.5, 18.0  # share of the usual speed, and parts of a turn, by which the rows around are away from 0
 
 
-def _held_positions(state: State) -> None:
-    """Report a position that repeats for some rows, again and again, while the heading or the yaw rate goes on."""
-    places = [one.source for one in state.suggestions if one.name in POSITIONS]
-    others = [one.source for one in state.suggestions if one.name in ("psi", "r")]
-    if len(places) < 2 or not others:
-        return
-    steps, moves = (np.stack([np.diff(state.columns[name]) != 0 for name in names]) for names in (places, others))
-    if np.mean(steps.all(axis=0)) < TOGETHER * np.mean(steps.any(axis=0)):
-        return  # rounded: each repeats for itself
-    edges = evidence.row_spans(np.all(~steps, axis=0))
-    lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before
-    moved = np.append(0, np.cumsum(moves.any(axis=0)))
-    lengths = lengths[moved[edges[:, 1]] > moved[edges[:, 0]]]
-    some = lengths[lengths <= STAY * np.median(lengths)] if len(lengths) else lengths  # longer: a ship at rest
-    share = float(some.sum()) / len(state.t)
-    if share > HELD_SHARE:
-        late = float(np.mean(some)) / 2 * float(np.median(np.diff(state.t)))
-        state.find(
-            "held positions",
-            tuple(places),
-            0.9,
-            f"in {100 * share:.0f} % of the rows the position repeats the row before while the heading goes on: a "
-            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap",
-        )
-
-
 def defects_of_rows(state: State, sniffed: LogTable) -> None:
-    """Report repeated rows, values that stop at a limit, holes, missing values, and a log that was interpolated."""
+    """Report holes, missing values, and a log that was interpolated."""
     sources = [column.source for column in state.suggestions if column.name in ("north", "east", "latitude", "u", "r")]
     moving = [name for name in sources if np.ptp(state.columns[name]) > 0]
     if moving:
-        same = np.all([np.diff(state.columns[name]) == 0 for name in moving], axis=0)
-        if same.mean() > 0.02:
-            state.find(
-                "frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before"
-            )
         share = float(np.median([evidence.interpolated_share(state.columns[name]) for name in moving]))
         if share > 0.2:
             state.find(
@@ -98,26 +60,6 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
                 0.9,
                 f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated",
             )
-    _held_positions(state)
-    for column in state.suggestions:
-        values = state.columns[column.source]
-        if is_shaft(column.name):
-            top = float(np.mean(values == values.max()))
-            ordered = len(np.unique(values)) <= ORDERED
-            if 0.05 < top < 0.9 and evidence.maximum_visits(values) >= VISITS and not ordered:
-                rows = f"{100 * top:.0f} % of the rows of {column.source!r}"
-                state.find("clipped", (column.source,), 0.7, f"{rows} have exactly the largest value, {values.max():g}")
-        elif column.name in MEASURED:
-            limits = [limit for limit in (values.max(), values.min()) if _piles_up(values, float(limit))]
-            if limits:
-                most = ", ".join(f"{limit:g}" for limit in limits)
-                share = float(np.mean(np.isin(values, limits)))
-                state.find(
-                    "clipped",
-                    (column.source,),
-                    0.7,
-                    f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it",
-                )
     steps = np.diff(sniffed.t)
     holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
     holes = max(holes - sniffed.seams, 0)
@@ -135,21 +77,11 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
         )
 
 
-def _piles_up(values: Array, limit: float) -> bool:
-    near = np.abs(values - limit)
-    levels = np.unique(near)
-    if limit == 0 or len(levels) < LEVELS:
-        return False
-    at = near == 0
-    beside = np.mean((near > 0) & (near <= levels[BESIDE]))
-    return bool(PILE < at.mean() < 0.9 and at.mean() > ABOVE * beside and evidence.maximum_visits(-near) >= RETURNS)
-
-
 def defects_of_motion(state: State) -> None:
     """Report contradictions between position, heading, velocity and yaw rate."""
     course = _ask_if_course(state)
     if state.velocity is None or state.body is None:
-        _report_position_jumps(state, _own_path(state), spikes=False)
+        _report_position_jumps(state, _own_path(state))
         _report_heading_offset(state)
         return
     _ask_for_set_clock(state)
@@ -176,6 +108,10 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             sentence = f"the heading is {1 / size[0]:.4f} times the integral of the yaw rate"
             repair = {"kind": "scale", "columns": ["r"], "factor": round(1 / size[0], 4)}
             _find_cause(state, "factor", sentence, found, repair)
+        elif key == "sensor psi bias":
+            path = np.asarray(path * np.exp(-1j * size[0]))
+            if abs(size[0]) > TURNED:
+                _ask_about_north(state, -size[0], float(np.ptp(found.interval[0])) / 2)
         elif key == "velocity through water":
             flow = complex(*size[:2])
             words = f"a current of {abs(flow):.2g} m/s towards {np.degrees(np.angle(flow)) % 360.0:.0f} deg"
@@ -198,6 +134,20 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             words = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
             state.find("position jitter", (), 0.8, f"{words}: take the path of the velocities")
     return path
+
+
+def _ask_about_north(state: State, angle: float, error: float) -> None:
+    """Ask what is off where the track is turned by an angle [rad] against velocities over ground."""
+    columns = {one.name: one for one in state.suggestions}
+    name = "course" if "course" in columns else "psi"
+    of = columns[name if name == "course" else "u"]
+    remedy = f"write offset = {angle / to_si(columns[name].unit, 'psi'):.4g} ({columns[name].unit}) for {name}"
+    what = "is the heading off, or the north of the positions another"
+    if name == "course" or "frame" in of.extra:
+        what = "is their north another than that of the positions, as that of a map or of a compass"
+        remedy = "turn the positions, or these" if name == "psi" else f"{remedy}, and for psi, too, if it counts so"
+    turned = f"the track is turned by {np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg against {of.source!r}"
+    state.ask(("psi", "course", "u", "v"), f"{turned}: {what}? Then {remedy}")
 
 
 def _late_path(state: State, path: Complex, seconds: float) -> Complex:
@@ -305,8 +255,8 @@ def _ask_for_set_clock(state: State) -> None:
         )
 
 
-def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> None:
-    """Report where positions leave a path (N,) [m]; of velocities also where they come back: `spikes`."""
+def _report_position_jumps(state: State, path: Complex) -> None:
+    """Report where positions leave a path (N,) [m] and do not come back."""
     unit = to_si(state.clock_unit, "t")
     lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
     places = [
@@ -315,8 +265,6 @@ def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> 
         if not any(unit * start <= place[1] and place[0] <= unit * end for start, end in lost)
     ]
     stay = [place for place in places if place[2] > 5.0]
-    back = [place for place in places if place[2] <= 5.0 and spikes]
-    repair: dict[str, Any]
     if stay and state.joined:
         count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
         state.find(
@@ -331,10 +279,6 @@ def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> 
         )
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
-    if back and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
-        words = ", ".join(clock_text(state, (start + end) / 2) for start, end, _ in back[:6])
-        words = f"at {len(back)} place{'s' * (len(back) > 1)} of the files" if state.joined else f"near {words}"
-        state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 
 def clock_text(state: State, t: float) -> str:
@@ -344,23 +288,9 @@ def clock_text(state: State, t: float) -> str:
 
 def _report_heading_offset(state: State) -> None:
     angle, error, current = _off_on_all_courses(state)
-    if error < CLEAR:
+    if error < CLEAR and np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # of more it is a drift, or another zero
         why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
         why += f", beside a steady current of {abs(current):.2g} m/s: heading off, positions in turned axes, or wind"
-    elif state.body is None:
-        return
-    else:
-        r = state.r if state.r is not None else np.gradient(state.psi, state.t)
-        rows = evidence.straight_rows(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
-        if rows.mean() < 0.02:
-            return
-        # median of arg(u + i v), where a ship has no drift angle
-        drift = np.angle(-state.body[rows] if state.astern else state.body[rows])
-        angle = float(np.median(drift))
-        error = float(np.median(np.abs(drift - angle))) / 2  # so that the limit below is 1.5 of this scatter
-        why = f"in straight runs the course leaves the heading by {np.degrees(angle):+.1f} deg"
-        why += ": heading off, or wind and current"
-    if np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # one of more is a drift, or the zero of the heading
         repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
         state.find("heading offset", ("psi",), 0.6, why, repair)
 
@@ -402,30 +332,29 @@ def _row_times(state: State, rows: NDArray[np.intp]) -> str:
 
 def take_lost_fixes(state: State) -> None:
     """Interpolate, in place, positions that receivers write without a fix, such as 0 N, far from those about them."""
-    pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude") if a != b]
-    for north, east in pairs[:1]:
-        lost = {name: lost_fixes(state.columns[name]) for name in (north, east)}
-        rows = lost[north] | lost[east]
-        if not 0 < rows.mean() < LOST:
-            continue
-        said = []
-        for name, hit in lost.items():
-            if hit.any():
-                fills = " or ".join(f"{value:g}" for value in np.unique(state.columns[name][hit]))
-                said.append((name, fills, _row_times(state, evidence.row_spans(hit)[:, 0])))
-                state.columns[name] = np.interp(state.t, state.t[~hit], state.columns[name][~hit])
-        step, unit = float(np.median(np.diff(state.t))), to_si(state.clock_unit, "t")
-        t = np.concatenate([[state.t[0] - step], state.t, [state.t[-1] + step]])
-        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in evidence.row_spans(rows)]
-        if len(said) > 1 and said[0][1:] == said[1][1:]:
-            words = f"{north!r} and {east!r} are {said[0][1]} {said[0][2]}"
-        else:
-            words = ", and ".join(f"{name!r} is {fills} {times}" for name, fills, times in said)
-        sentence = f"{words}: the receiver had no fix"
-        if state.joined:
-            state.ask(("latitude", "longitude"), f"{sentence}. Leave these cells empty, and draft again")
-        repair = None if state.joined else {"kind": "break", "intervals": breaks}
-        state.find("no fix", tuple(name for name, hit in lost.items() if hit.any()), 0.95, sentence, repair)
+    for names in [(a, b) for a in state.called("latitude") for b in state.called("longitude") if a != b][:1]:
+        lost = {name: lost_fixes(state.columns[name]) for name in names}
+        if 0 < np.mean(lost[names[0]] | lost[names[1]]) < LOST:
+            for name in (name for name in names if lost[name].any()):
+                fills = " or ".join(f"{value:g}" for value in np.unique(state.columns[name][lost[name]]))
+                _take_out(
+                    state, name, lost[name], "no fix", fills, "the receiver had no fix", ("latitude", "longitude")
+                )
+
+
+def _take_out(
+    state: State, name: str, rows: NDArray[np.bool_], kind: str, fills: str, why: str, about: tuple[str, ...]
+) -> None:
+    """Interpolate rows (N,) of a column that hold no value, and report them; the repair breaks the run there."""
+    t, unit, step = state.t, to_si(state.clock_unit, "t"), float(np.median(np.diff(state.t)))
+    spans = evidence.row_spans(rows)
+    state.columns[name] = np.interp(t, t[~rows], state.columns[name][~rows])
+    sentence = f"{name!r} is {fills} {_row_times(state, spans[:, 0])}: {why}"
+    if state.joined:
+        state.ask(about, f"{sentence}. Leave these cells empty, and draft again")
+    around = np.concatenate([[t[0] - step], t, [t[-1] + step]])
+    breaks = [[around[first] / unit, around[end + 1] / unit] for first, end in spans]
+    state.find(kind, (name,), 0.95, sentence, None if state.joined else {"kind": "break", "intervals": breaks})
 
 
 def lost_fixes(values: Array) -> NDArray[np.bool_]:
@@ -445,8 +374,7 @@ def lost_fixes(values: Array) -> NDArray[np.bool_]:
 
 def take_zeros(state: State) -> None:
     """Interpolate, in place, a speed or heading of 0 between rows far from it: no ship stops or turns in one row."""
-    t, unit = state.t, to_si(state.clock_unit, "t")
-    step = float(np.median(np.diff(t)))
+    t, step = state.t, float(np.median(np.diff(state.t)))
     speeds = [*state.called("speed"), *state.called("u")]
     for name in dict.fromkeys([*speeds, *state.called("psi"), *state.called("course")]):
         values, known = state.columns[name], state.columns[name] != 0.0
@@ -464,18 +392,14 @@ def take_zeros(state: State) -> None:
         kept = np.ones(len(t), dtype=bool)
         kept[rows] = False
         smallest = float(min(min(size[a - 1], size[b]) for a, b in inside))
-        state.columns[name] = np.interp(t, t[kept], values[kept])
         most = OFTEN / step if name in speeds else 2
         if max(b - a for a, b in inside) <= most and name not in state.called("course"):
+            state.columns[name] = np.interp(t, t[kept], values[kept])
             before, least = state.spikes.get(name, (rows, smallest))
             state.spikes[name] = np.union1d(rows, before), min(smallest, least)
             continue
-        starts = np.array([a for a, _ in inside], dtype=np.intp)
-        sentence = f"{name!r} is 0 {_row_times(state, starts)} between values far from it: it was written for no value"
-        if state.joined:
-            state.ask(("u", "v", "psi", "speed", "course"), f"{sentence}. Leave these cells empty, and draft again")
-        breaks = [[t[a - 1] / unit, t[b] / unit] for a, b in inside]
-        state.find("zeros", (name,), 0.9, sentence, None if state.joined else {"kind": "break", "intervals": breaks})
+        why = "between values far from it, it was written for no value"
+        _take_out(state, name, ~kept, "zeros", "0", why, ("u", "v", "psi", "speed", "course"))
 
 
 def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[np.intp], float]]:

@@ -236,20 +236,6 @@ def _complex_median(points: Complex) -> complex:
     return complex(np.median(points.real), np.median(points.imag))
 
 
-def straight_rows(r: Array, t: Array) -> NDArray[np.bool_]:
-    """The rows of the straightest parts, where the ship hardly turns for half a minute."""
-    usual = float(np.median(np.diff(t)))
-    width = max(3, round(30.0 / usual))
-    calm = pd.Series(np.abs(r)).rolling(width, center=True, min_periods=width // 2).max().to_numpy()
-    return np.asarray(calm < max(np.radians(0.3), 0.1 * float(np.percentile(np.abs(r), 95))))
-
-
-def maximum_visits(values: Array) -> int:
-    """How often a signal reaches its largest value."""
-    top = values == values.max()
-    return int(np.sum(np.diff(top.astype(int)) == 1))
-
-
 def interpolated_share(values: Array) -> float:
     """The share of rows exactly on the line between their neighbours, among rows where a value changes."""
     first, second = np.diff(values), np.diff(values, 2)
@@ -349,20 +335,3 @@ def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
     rates = np.abs(chosen.change(psi).real) / span
     turning = float(np.percentile(rates, 90)) if len(rates) else 0.0
     return float(np.clip(1.0 / turning, 0.2, WINDOW)) if turning > 0 else WINDOW
-
-
-def fit_with_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[Fit, complex]:
-    """Fit seen = scale * integrated + arm * turned by least squares: the fit, and the arm x + i y [m].
-
-    turned : change of exp(i psi) over each window.
-    """
-    total = float(np.sum(np.abs(seen) ** 2))
-    columns = np.stack([integrated, turned, 1j * turned], axis=1)
-    design = np.concatenate([columns.real, columns.imag])
-    size = np.linalg.norm(design, axis=0)
-    if total <= 0.0 or not np.all(size > 0):
-        return fit_scale(seen, integrated), 0j
-    both = np.concatenate([seen.real, seen.imag])
-    solution = np.linalg.lstsq(design / size, both, rcond=None)[0] / size
-    left = float(np.sum((both - design @ solution) ** 2)) / total
-    return Fit(float(solution[0]), np.inf, left), complex(solution[1], solution[2])

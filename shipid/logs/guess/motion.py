@@ -10,7 +10,7 @@ import numpy as np
 from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, si_unit, unit_in_name
-from shipid.logs.guess.evidence import Complex, Fit
+from shipid.logs.guess.evidence import Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
     LENGTHS,
@@ -36,7 +36,6 @@ ABREAST = np.radians(0.5)  # by which two headings of one ship may differ
 FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes or turns harder, no trial is slower
 FROUDE = 4.0  # U / sqrt(g L): nothing that is steered in trials is faster for its length
 FAR = 2.0  # a factor that no sensor has
-TURNED, ONE_WAY = np.radians(0.5), 0.9  # of a track against a course, at least; mean of its directions, at most
 
 
 def choose_motion(state: State, file: Path, frame: Frame | None = None) -> None:
@@ -215,8 +214,8 @@ def _take_velocities(state: State, best: MotionReading, found: Velocity) -> None
             confidence = min(confidence, 0.59)
         _suggest_two(state, best, found, unit, confidence, why)
     state.velocity, state.body = ground, np.asarray(ground / heading)
-    fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
-    fit, state.velocity = _as_track(state, fit, ground, (second,) if found.kind == "course" else sources, found.kind)
+    seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, ground)))
+    fit = evidence.fit_without_outliers(seen, ran * np.exp(1j * np.angle(np.vdot(ran, seen))))  # a turn is no factor
     _report_factor(state, fit, sources, unit, ("speed",) if found.kind == "course" else ("u", "v"))
 
 
@@ -283,38 +282,6 @@ def _report_factor(state: State, fit: Fit, sources: tuple[str, ...], unit: str, 
         sure = float(np.clip(off / (5 * fit.error + 1e-9), 0.2, 0.9))
         repair = {"kind": "scale", "columns": list(columns), "factor": round(fit.scale, 4)}
         state.find("factor", sources, sure, f"{begins} (+- {fit.error:.2g})", repair)
-
-
-def _as_track(state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], kind: str) -> tuple[Fit, Complex]:
-    """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it."""
-    seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, velocity)))
-    keep = evidence.windows_without_outliers(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
-    if keep.sum() < 20 or abs(complex(np.mean(ran[keep] / np.abs(ran[keep])))) > ONE_WAY:
-        return fit, velocity
-    angles, rates = np.angle(seen[keep] * np.conj(ran[keep])), state.chosen.change(state.psi).real[keep]
-    design = np.stack([np.ones_like(rates), rates], axis=1)
-    (angle, slope), *_ = np.linalg.lstsq(design, angles, rcond=None)
-    parts = [float(np.mean(part)) for part in np.array_split(angles - slope * rates, 10)]
-    error = 1.25 * float(np.std(parts)) / np.sqrt(len(parts))
-    if not max(TURNED, 5 * error) < abs(angle) < np.pi / 4:
-        return fit, velocity
-    degrees = f"{np.degrees(angle):+.1f} +- {np.degrees(error):.1f} deg"
-    words = f"the track is turned by {degrees} against {' and '.join(map(repr, sources))}"
-    units = {one.name: one.unit for one in state.suggestions}
-    if kind == "body":
-        unit = units.get("psi", "rad")
-        words += " along the heading: is the heading off, or the north of the positions another? Then write offset = "
-        state.ask(("psi", "u", "v"), f"{words}{angle / to_si(unit, 'psi'):.4g} ({unit}) for psi")
-    else:
-        words += ": is their north another than that of the positions, as that of a map or of a compass? Then "
-        unit = units.get("course", "deg")
-        remedy = (
-            f"write offset = {angle / to_si(unit, 'psi'):.4g} ({unit}) for course, and for psi, too, if it counts so"
-        )
-        remedy = remedy if kind == "course" else "turn the positions, or these"
-        state.ask(("psi", "course", "u", "v"), words + remedy)
-    turn = np.exp(1j * angle)
-    return evidence.fit_scale(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
 
 
 # --- yaw rate and clock ---

@@ -219,6 +219,8 @@ def _named_places(state: State) -> Iterator[Place]:
 def _named_headings(state: State) -> list[str]:
     names = [name for name in state.all_called("psi") if not is_order(name) or may_be_measured(name)]
     names = [name for name in names if not is_magnetic(name)] or names  # beside a true one it is a second one
+    courses = _logged_courses(state, "")
+    names = [name for name in names if name not in courses] or names
     if not names:  # of a plane x, y, theta, which takes more than a quarter of a turn, as no pitch does
         names = [
             name
@@ -241,7 +243,9 @@ def _pose_beyond_names(state: State, named: list[Pose], places: list[Place], hea
     globe = [(a, b) for a, b in permutations(free, 2) if _may_be_globe(state, a, b)]
     plane = [pair for pair in combinations(free, 2) if not {pair, pair[::-1]} & {*globe}]
     wide = [Place(a, b, False, cost) for a, b in plane] + [Place(a, b, True, cost) for a, b in globe]
-    found = _rank_poses(state, [*places, *wide], list(dict.fromkeys([*headings, *free])))
+    courses = _logged_courses(state, "") if headings else []  # which fit a track better than any heading
+    ways = [name for name in dict.fromkeys([*headings, *free]) if name not in courses]
+    found = _rank_poses(state, [*places, *wide], ways)
     found = [one for one in found if one.misfit < SETTINGS.poor]
     best = next(iter(found), None)
     if best is None or (named and best.misfit > 0.5 * named[0].misfit):
@@ -549,15 +553,11 @@ def _speeds_and_courses(state: State, pose: Pose, seen: Complex, theta: Array) -
 def _side_cost_of_sway(
     state: State, ground: Complex, theta: Array, seen: Complex, change: Complex, mirror: Complex
 ) -> tuple[float, bool]:
-    """What speaks against the side of a sway beside its mirror image, and whether the track leaves it open.
+    """What speaks against the side of a sway beside its mirror image, by the track and by a ship's drift out of turns.
 
-    The track with a free arm between the points of positions and velocities; and a ship's drift out of its turns.
+    Also whether the track leaves it open.
     """
-    turned = state.chosen.change(np.asarray(np.exp(1j * theta)))
-    left = []
-    for ran in (change, mirror):
-        keep = evidence.windows_without_outliers(seen, ran)
-        left.append(evidence.fit_with_arm(seen[keep], ran[keep], turned[keep])[0].left + 1e-6)
+    left = [evidence.fit_without_outliers(seen, ran).left + 1e-6 for ran in (change, mirror)]
     by_track = float(np.log(left[0] / left[1]))
     drift = _drift_in_turns(state, ground, theta)
     by_drift = -float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)

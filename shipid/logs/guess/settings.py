@@ -39,8 +39,7 @@ class SearchSettings:
     advance, near : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05), and the
         square of the logarithm of how many times a unit may be off that before it is doubted: 15 times.
     alike : ratio of two scales that are one.
-    least_part : share of all motion that a part with another unit has.
-    two_left, two_left_of_turns : share of what one scale leaves that two leave, at most; of what turns the ship.
+    two_left : share of what one scale leaves that two leave, at most.
     steady : share of the mean wind speed by which a wind may change while the ship turns.
     """
 
@@ -74,9 +73,7 @@ class SearchSettings:
     advance: float = 0.01
     near: float = 7.3
     alike: float = 1.4
-    least_part: float = 0.05
     two_left: float = 0.3
-    two_left_of_turns: float = 0.75
     steady: float = 0.25
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import cumulative_integral
-from shipid.logs.guess.changes import ask_for_changes, other_part
+from shipid.logs.guess.changes import FEWEST, ask_for_changes, odd_scales
 from shipid.logs.guess.columns import guess
+from shipid.logs.guess.sources import PAUSE
 from tests.drawn import seeds
 from tests.logs.simulated import as_bridge, guess_of, si_log, state_of
 
@@ -32,7 +33,11 @@ def test_a_change_of_unit_or_sign_is_asked_with_its_time(
     result = guess_of(
         tmp_path, CLEAN.assign(**{name: CLEAN[name].where(~after, factor * CLEAN[name]) for name in columns})
     )
-    asked = [one.sentence for one in result.questions if "another unit or sign" in one.sentence]
+    asked = [
+        one.sentence
+        for one in result.questions
+        if "another unit or sign" in one.sentence or "to the other side" in one.sentence
+    ]
     assert len(asked) == 1, asked
     assert all(repr(name) in asked[0] for name in columns)
     times = [float(text) for text in re.findall(r"t = ([\d.]+)", asked[0])]
@@ -45,43 +50,18 @@ def test_a_log_of_one_unit_is_not_asked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", seeds(1, 3))
-def test_the_part_with_another_scale_is_found_where_it_is(seed: int) -> None:
-    random, shares = np.random.default_rng(seed), np.zeros(2)
-    while shares.min() < 0.1:  # of the motion, in the part and outside: a smaller part is not to be seen
-        count, ratio = int(random.integers(60, 1500)), float(random.choice([-1.0, 0.01, 0.5, 2.0, 60.0]))
-        ran = random.normal(5, 2, count) * np.exp(1j * random.uniform(0, 7, count))
-        first, end = sorted(random.choice(np.arange(count // 20, 0.95 * count, count // 20), 2, replace=False))
-        inside = (np.arange(count) >= first) & (np.arange(count) < end)
-        seen = np.where(inside, ratio, 1.0) * ran + random.normal(0, 0.001, count)
-        shares = np.bincount(inside, np.abs(seen) ** 2, 2) / np.sum(np.abs(seen) ** 2)
-    part = other_part(seen, ran)
-    assert part is not None
-    found = np.zeros(count, dtype=bool)
-    found[part.first : part.end] = True
-    assert np.mean(found == inside) > 0.97
-    assert part.ratio == pytest.approx(ratio, rel=0.1)  # parts begin and end at a node of 120
-    assert other_part(ran + random.normal(0, 0.5, count), ran) is None
-
-
-def shaft_asked(t: np.ndarray, speed: np.ndarray, rpm: np.ndarray) -> list[str]:
-    """What is asked about a shaft (N,) of a ship with this speed (N,) [m/s]."""
-    state = state_of({"rpm": rpm}, t)
-    state.position, state.psi = np.asarray(cumulative_integral(t, speed), dtype=np.complex128), np.zeros(len(t))
-    state.suggest("propeller.n", "rpm", "rpm", 0.9, "by its name")
-    ask_for_changes(state)
-    return [one.sentence for one in state.questions]
-
-
-@pytest.mark.parametrize("seed", seeds(1, 3))
-def test_a_shaft_that_windmills_or_a_ship_on_the_spot_has_no_other_unit(seed: int) -> None:
+def test_the_parts_with_another_scale_are_found(seed: int) -> None:
     random = np.random.default_rng(seed)
-    t = np.arange(0.0, 1200.0, 1.0)
-    after = np.clip(t - random.uniform(300, 800), 0.0, np.inf)
-    speed = 5.0 / (1.0 + after / random.uniform(100, 600))
-    coasts = 20.0 * speed * (1.0 - random.uniform(0.75, 0.9) * np.clip(after / random.uniform(8, 25), 0.0, 1.0))
-    assert not shaft_asked(t, speed, coasts + random.normal(0, 0.3, len(t)))
-    spot = 1.0 + 4.0 * np.exp(-after / 60)
-    assert not shaft_asked(t, spot, 100.0 + random.normal(0, 0.3, len(t)) + random.uniform(0, 60) * (after > 0))
+    count, ratio = int(random.integers(10 * FEWEST, 1500)), float(random.choice([-1.0, 0.01, 0.5, 2.0, 60.0]))
+    ran = random.normal(5, 2, count) * np.exp(1j * random.uniform(0, 7, count))
+    parts = [np.isin(np.arange(count), rows) for rows in np.array_split(np.arange(count), 10)]
+    first = int(random.integers(0, 7))
+    inside = np.any(parts[first : first + 3], axis=0)
+    seen = np.where(inside, ratio, 1.0) * ran + random.normal(0, 0.001, count)
+    odd, found = odd_scales(seen, ran, parts)
+    assert odd == [first, first + 1, first + 2]
+    assert found == pytest.approx(ratio, rel=0.01)
+    assert odd_scales(ran + random.normal(0, 0.5, count), ran, parts)[0] == []
 
 
 @pytest.mark.parametrize("slow", [True, False])
@@ -99,8 +79,8 @@ def test_an_angle_that_turns_the_ship_otherwise_is_asked_under_way_alone(seed: i
     speed = np.where(first, 5.0, 0.3 if slow else 5.0)
     state.position = np.cumsum(speed * np.exp(1j * state.psi)) + random.normal(0, 0.3, len(t))
     state.suggest("thruster.alpha", "azimuth", "rad", 0.9, "by its name")
-    ask_for_changes(state)
-    asked = [one.sentence for one in state.questions if "times as fast: to the other side" in one.sentence]
+    ask_for_changes(state, PAUSE)
+    asked = [one.sentence for one in state.questions if "turns the ship to the other side" in one.sentence]
     assert len(asked) == (not slow)
 
 

@@ -73,7 +73,6 @@ def test_gunnerus(gunnerus_log: Path) -> None:
     assert set(findings) == {
         "interpolation across 360",
         "interpolated from a slower log",
-        "clipped",  # at 205 rpm
         "position jumps",
         "position jitter",
         "heading offset",

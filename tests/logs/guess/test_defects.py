@@ -62,16 +62,6 @@ def turned(frame: pd.DataFrame, angle: float) -> pd.DataFrame:
 
 
 DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
-    "frozen rows": (
-        lambda frame: frame.assign(
-            **{
-                name: frame[name].where((frame.index // 20) % 4 != 0).ffill().bfill()
-                for name in frame
-                if name != "time"
-            }
-        ),
-        r"2\d % of the rows repeat",
-    ),
     "holes in time": (lambda frame: frame.drop(range(500, 540)), r"1 steps are more than 3 times"),
     "missing values": (lambda frame: frame.assign(u=frame["u"].where(frame.index % 50 != 7)), r"no value in 'u'"),
     "lever arm": (lambda frame: moved(frame, 9.0, -3.0), r"\+(8\.9|9\.\d) m forward and -(2\.9|3\.\d) m to starboard"),
@@ -124,17 +114,30 @@ def test_positions_that_are_late_do_not_jump_at_an_end_of_the_log(delay: float, 
     assert kinds == {"late position" if delay > 0 else "late velocity"}
 
 
-@pytest.mark.parametrize("angle", [0.0, 4.0])
-def test_a_heading_along_which_the_velocities_are_not_the_track_is_asked(angle: float, tmp_path: Path) -> None:
-    """u and v were measured in the ship, so that they are right; a repair that turns them is none."""
-    result = guess_of(tmp_path, CLEAN.assign(psi=(CLEAN["psi"] - angle) % 360.0))
-    asked = [one.sentence for one in result.questions if "track is turned" in one.sentence]
-    assert len(asked) == (angle != 0.0)
-    assert "heading offset" not in result.kinds
+def read_otherwise(kind: str, angle: float) -> pd.DataFrame:
+    """A log whose heading, course, or north of velocities is low by an angle [deg]."""
+    if kind == "psi":
+        return CLEAN.assign(psi=(CLEAN["psi"] - angle) % 360.0)
+    course = with_course(1)
+    way = (course["COG"] - angle) % 360.0
+    if kind == "course":
+        return course.assign(COG=way)
+    north, east = (course["SOG"] * along(np.radians(way)) for along in (np.cos, np.sin))
+    return course.drop(columns=["SOG", "COG"]).assign(v_north=north, v_east=east)
+
+
+@pytest.mark.parametrize("angle", [0.2, 1.0, -8.0])
+@pytest.mark.parametrize("kind", ["psi", "course", "earth"])
+def test_velocities_that_are_not_along_the_track_are_asked(kind: str, angle: float, tmp_path: Path) -> None:
+    """As by the north of a map or a compass: no factor of the speed, which its cosine looked like, and no repair."""
+    result = guess_of(tmp_path, read_otherwise(kind, angle))
+    asked = [one.sentence for one in result.questions if "the track is turned" in one.sentence]
+    assert len(asked) == (abs(angle) >= 1.0)
+    assert "factor" not in result.kinds
     for sentence in asked:
-        offset = re.search(r"offset = (\S+) \(deg\) for psi", sentence)
-        assert offset is not None
-        assert float(offset[1]) == pytest.approx(angle, abs=0.3)
+        assert re.search(rf"turned by {re.escape(f'{angle:+.1f}')} \+- 0\.\d deg against", sentence), sentence
+        offset = re.search(rf"offset = (\S+) \(deg\) for {kind}", sentence)
+        assert kind == "earth" or (offset and float(offset[1]) == pytest.approx(angle, abs=0.1)), sentence
 
 
 @pytest.mark.parametrize(("factor", "delay"), [(0.9, 0.0), (1.0, 2.0), (10 / 9, 2.0)])
@@ -216,8 +219,8 @@ def test_one_coordinate_of_0_is_no_fix(where: dict[str, list[int]], tmp_path: Pa
     drafted = [(one.name, one.source, one.unit, one.extra) for one in proposal.columns]
     assert drafted == [(one.name, one.source, one.unit, one.extra) for one in expected.columns]
     assert proposal.kinds == expected.kinds | {"no fix"}
-    sentence = next(one.sentence for one in proposal.findings if one.kind == "no fix")
-    assert all(f"{name!r} is 0" in sentence for name in where)
+    sentences = [one.sentence for one in proposal.findings if one.kind == "no fix"]
+    assert [sentence.partition(" is 0 ")[0] for sentence in sentences] == [repr(name) for name in where]
     dataset = import_draft(tmp_path, proposal).frame
     log = si_log(0)
     kept = log["t"].isin(dataset["t"]).to_numpy()

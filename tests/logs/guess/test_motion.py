@@ -137,23 +137,3 @@ def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int]
     if expected is not None:
         assert state.r is not None
         np.testing.assert_allclose(state.r, R, atol=1e-12)
-
-
-def over_ground(turn: float = 0.0) -> dict[str, np.ndarray]:
-    """Speed, and a course turned by an angle [rad]."""
-    return {"sog": np.abs(GROUND), "cog": np.degrees(np.angle(GROUND) + turn) % 360.0}
-
-
-@pytest.mark.parametrize("degrees", [-8.0, 0.2, 1.0])
-@pytest.mark.parametrize("earth", [True, False], ids=["north and east", "speed and course"])
-def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, earth: bool) -> None:
-    """As by the north of a map or a compass; it is no factor of the speed, which its cosine looked like."""
-    turn = np.radians(degrees)
-    there = GROUND * np.exp(1j * turn)
-    state = chosen({"v north": there.real, "v east": there.imag} if earth else over_ground(turn))
-    assert not state.findings
-    assert len(state.questions) == (abs(degrees) >= 1.0)
-    for question in state.questions:
-        assert question.sentence.startswith(f"the track is turned by {-degrees:+.1f} +- 0.")
-        said = float(question.sentence.partition("offset = ")[2].partition(" ")[0] or np.nan)
-        assert np.isnan(said) if earth else said == pytest.approx(-degrees, abs=0.02)

@@ -226,3 +226,16 @@ def test_the_true_frame_is_among_those_that_are_asked(
     """The motion is the same in all of them, in which port and starboard change places."""
     (question,) = chosen({"x": x, "y": y, name: yaw % 360.0}).questions
     assert reading.format(name) in question.sentence
+
+
+@pytest.mark.parametrize("share", [0.0, 0.9, 1.2])
+def test_a_course_is_no_heading_beside_a_column_named_as_one(share: float) -> None:
+    """Of a slow ship in a current, whose track keeps to its course and hardly to its heading; r was not read either."""
+    log = si_log()
+    t, stream = log["t"].to_numpy(), share * float(np.median(SURGE)) * np.exp(2.0j)
+    ground = (SURGE + 1j * SWAY) * np.exp(1j * PSI) + stream
+    course, rate = np.degrees(np.angle(ground)) % 360.0, log["r"].to_numpy()
+    place = {"N": NORTH + stream.real * t, "E": EAST + stream.imag * t}
+    words = {"ground_course": course, "ground_speed": np.abs(ground), "AHR2.Yaw": DEG % 360.0, "RATE.Y": rate}
+    drafted = {one.name: one.source for one in chosen({**place, **words}).suggestions}
+    assert (drafted["psi"], drafted["course"], drafted["r"]) == ("AHR2.Yaw", "ground_course", "RATE.Y")

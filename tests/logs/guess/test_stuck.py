@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.logs.guess.columns import guess
 from tests.logs.simulated import SCHEDULE, as_bridge, guess_of, import_draft, si_log
 
 LOG = si_log()
@@ -49,12 +48,3 @@ def test_a_sensor_that_stands_still_in_a_turn_is_broken_out(name: str, tmp_path:
 def test_what_may_be_so_is_not_reported(name: str, start: float, duration: float, tmp_path: Path) -> None:
     """A short repetition, and a course that stays in a straight run."""
     assert "frozen sensor" not in guess_of(tmp_path, stood(name, start, duration)).kinds
-
-
-@pytest.mark.parametrize(("name", "share", "told"), [("SOG", 0.9, True), ("r", 0.7, True), ("SOG", 1.2, False)])
-def test_a_sensor_that_stops_at_a_limit_is_clipped(name: str, share: float, told: bool, tmp_path: Path) -> None:
-    frame = bridge()
-    most = share * np.percentile(frame[name].abs(), 99)
-    frame.assign(**{name: frame[name].clip(-most, most)}).to_csv(tmp_path / "log.csv", index=False)
-    found = [finding for finding in guess(tmp_path / "log.csv").findings if finding.kind == "clipped"]
-    assert [finding.columns for finding in found if finding.columns == (name,)] == ([(name,)] if told else [])
