@@ -384,11 +384,11 @@ def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
     known = len(units) == 1 and units <= UNITS["rev/s"].keys()
     zeros = {name: _neutral_value(state, name) for name in pair}
     if not known:
-        words = f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor"
-        state.ask(("n",), words)
+        state.ask(
+            ("n",), f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor"
+        )
         if not all(why for _, why in zeros.values()):
-            words = f"which value of {both} is a stopped screw? 0 is a guess: write offset = -factor * value"
-            state.ask(("n",), words)
+            state.ask(("n",), f"which value of {both} is a stopped screw? 0 is a guess: write offset = -factor * value")
     if not by_name:
         state.ask(("n",), f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard")
     for side, name in zip(("port", "starboard"), pair, strict=True):
