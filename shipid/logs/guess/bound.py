@@ -135,7 +135,7 @@ def _suggest_curve(state: State, one: Suggestion, signal: str, limits: Sequence[
     name, values = f"{one.name.partition('.')[0]}.{signal}", state.columns[one.source]
     unit, bend = ("N", 1.5) if signal == "force" else ("deg", 1.0)  # between 1 and the 2 of a shaft speed: a guess
     zero = -one.extra.get("sign", 1) * one.extra.get("offset", 0.0) / one.extra["factor"]
-    far = max(400.0 * (PULSES[0] < zero < PULSES[1]), float(np.ceil(np.abs(values[values != 0] - zero).max())))
+    far = max(400.0 * (PULSES[0] < zero < PULSES[1]), float(np.ceil(np.nanmax(np.abs(values[values != 0] - zero)))))
     low, high = np.array(limits) / to_si(unit, name)
     curve = [
         [zero + share * far, float(f"{(high if share > 0 else low) * abs(share) ** bend:.4g}")]
@@ -144,7 +144,7 @@ def _suggest_curve(state: State, one: Suggestion, signal: str, limits: Sequence[
     state.questions[:] = [
         each
         for each in state.questions
-        if signal_of(one.name) not in each.about or repr(one.source) not in each.sentence
+        if signal in each.about or signal_of(one.name) not in each.about or repr(one.source) not in each.sentence
     ]
     state.ask(
         (signal,),

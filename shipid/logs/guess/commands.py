@@ -390,7 +390,10 @@ def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
         if not all(why for _, why in zeros.values()):
             state.ask(("n",), f"which value of {both} is a stopped screw? 0 is a guess: write offset = -factor * value")
     if not by_name:
-        state.ask(("n",), f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard")
+        state.ask(
+            ("n", "force"),
+            f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard",
+        )
     for side, name in zip(("port", "starboard"), pair, strict=True):
         zero, seen = zeros[name]
         extra = {} if known else {"factor": 1.0} | ({"offset": -zero} if zero else {})

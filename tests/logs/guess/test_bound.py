@@ -180,16 +180,23 @@ def test_the_sign_of_an_azimuth_unit_is_that_of_its_place(x: float, turns: float
 
 @pytest.mark.parametrize("seed", seeds(2, 3))
 @pytest.mark.parametrize("neutral", [1500.0, 0.0])
-def test_throttles_without_a_unit_are_forces_within_the_limits_of_a_small_craft(seed: int, neutral: float) -> None:
+@pytest.mark.parametrize("names", [("pwm_port", "pwm_stbd"), ("RCOU.C1", "RCOU.C3")])
+def test_throttles_without_a_unit_are_forces_within_the_limits_of_a_small_craft(
+    seed: int, neutral: float, names: tuple[str, str]
+) -> None:
     """Nothing at neutral, the vessel's limits at the ends, more for more; the factor of a shaft speed is not asked."""
     log, far = craft(seed), 400.0 if neutral else 100.0
-    pair = {f"pwm_{side}": neutral + far * log[side].to_numpy() for side in ("port", "starboard")}
+    sides = ("port", "starboard")
+    pair = {name: neutral + far * log[side].to_numpy() for name, side in zip(names, sides, strict=True)}
     ship = guess_craft(
         SmallCraft(2.0, 1.0, 80.0, 2.5, ((-0.8, -0.4), (-0.8, 0.4)), thrust=55.0), "craft", "c.toml"
     ).vessel
     state = guessed(log, pair)
     name_commands(state, ship)
-    assert {one.name: one.source for one in state.suggestions} == {f"{name[4:]}.force": name for name in pair}
+    assert {one.name: one.source for one in state.suggestions} == {
+        "port.force": names[0],
+        "starboard.force": names[1],
+    }
     for one in state.suggestions:
         ends, forces = np.array(one.extra["curve"]).T
         actuator = f"thruster.{one.name.replace('.', '.actuator.')}"
@@ -200,7 +207,8 @@ def test_throttles_without_a_unit_are_forces_within_the_limits_of_a_small_craft(
         assert ends[0] <= pair[one.source].min()
         assert pair[one.source].max() <= ends[-1]
         assert one.unit == "N"
-    assert [each.about for each in state.questions] == [("force",)] * 2
+    of_sides = [("n", "force")] * (names[0] == "RCOU.C1")  # no name says them
+    assert [each.about for each in state.questions] == [*of_sides, ("force",), ("force",)]
 
 
 def test_a_servo_is_the_swivel_of_an_outboard_with_the_sign_that_turns_it() -> None:
