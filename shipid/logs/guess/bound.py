@@ -9,7 +9,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
+from shipid.logs.guess.commands import PULSES
 from shipid.logs.guess.words import name_parts, number_in_name, side_in_name, words_of_side
+from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
@@ -27,7 +29,7 @@ def name_commands(state: State, vessel: Vessel) -> None:
     drives, helm = controls.effects
     moving = {name for name in controls.commands if is_shaft(name) or is_steering(name)}
     idle = moving - {*drives, *helm} if drives else set[str]()
-    _drop_guesses(state, {signal_of(name) for name in controls.commands})
+    _fit_guesses(state, controls.commands, vessel)
     _take_tunnels(state, [name for name in controls.commands if name in idle and is_shaft(name)])
     components: dict[str, str] = {}
     named: list[Suggestion] = []
@@ -81,10 +83,9 @@ def _columns_of_commands(
         one.source for col, one in enumerate(drafted) if one not in found.values() and against[:, col].min() < NEVER
     ]
     if rest:
-        taken = [one.source for one in found.values()]
-        words = f"{', '.join(found)} {'are' if len(found) > 1 else 'is'} {', '.join(map(repr, taken))}"
+        words = ", ".join(f"{name} is {one.source!r}" for name, one in found.items())
         more = f"{words}, not {', '.join(map(repr, rest))}"
-        state.find("several columns for one command", (*taken, *rest), 0.6, more)
+        state.find("several columns for one command", (*(one.source for one in found.values()), *rest), 0.6, more)
     return found
 
 
@@ -113,12 +114,45 @@ def _across(name: str, vessel: Vessel) -> float:
     return -y if y else {"starboard": -1.0, "port": 1.0}.get(_place_in_name(name), 0.0)
 
 
-def _drop_guesses(state: State, signals: set[str]) -> None:
-    """Take back what the names do not say and the vessel does not have, such as a rudder."""
+def _fit_guesses(state: State, commands: Sequence[str], vessel: Vessel) -> None:
+    """Draft what no name says as what the vessel has: a force for a screw, a swivel for a rudder; drop the rest."""
+    signals = {signal_of(name) for name in commands}
     for one in [*state.suggestions]:
-        if is_command(one.name) and signal_of(one.name) not in signals and one.confidence < LIKELY:
+        said = signal_of(one.name)
+        if is_command(one.name) and said not in signals and one.confidence < LIKELY:
             state.suggestions.remove(one)
-            state.taken.discard(one.source)
+            signal = {"n": "force", "delta": "alpha"}.get(said)
+            alike = [f"thruster.{name.replace('.', '.actuator.')}" for name in commands if signal_of(name) == signal]
+            limits = [vessel.parameters.get(f"{path}.{end}", 0.0) for path in alike[:1] for end in ("low", "high")]
+            if signal and "factor" in one.extra and any(limits):
+                _suggest_curve(state, one, signal, limits)
+            else:
+                state.taken.discard(one.source)
+
+
+def _suggest_curve(state: State, one: Suggestion, signal: str, limits: Sequence[float]) -> None:
+    """Suggest a throttle or pulses by a curve that ends at limits (low, high) [N, rad] of the vessel, and ask."""
+    name, values = f"{one.name.partition('.')[0]}.{signal}", state.columns[one.source]
+    unit, bend = ("N", 1.5) if signal == "force" else ("deg", 1.0)  # between 1 and the 2 of a shaft speed: a guess
+    zero = -one.extra.get("sign", 1) * one.extra.get("offset", 0.0) / one.extra["factor"]
+    far = max(400.0 * (PULSES[0] < zero < PULSES[1]), float(np.ceil(np.nanmax(np.abs(values[values != 0] - zero)))))
+    low, high = np.array(limits) / to_si(unit, name)
+    curve = [
+        [zero + share * far, float(f"{(high if share > 0 else low) * abs(share) ** bend:.4g}")]
+        for share in (-1.0, -0.5, 0.0, 0.5, 1.0)
+    ]
+    state.questions[:] = [
+        each
+        for each in state.questions
+        if signal in each.about or signal_of(one.name) not in each.about or repr(one.source) not in each.sentence
+    ]
+    state.ask(
+        (signal,),
+        f"does {one.source!r} order {high:.4g} {unit} at {zero + far:g}? The vessel ends there: correct the curve, "
+        f"and write the dead band about {zero:g} into it",
+    )
+    extra = {key: value for key, value in one.extra.items() if key == "sign"} | {"curve": curve}
+    state.suggestions.append(replace(one, name=name, unit=unit, extra=extra))
 
 
 def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Suggestion:
@@ -154,8 +188,8 @@ def _missing_command(state: State, name: str, idle: set[str], vessel: Vessel) ->
     if name in idle and is_shaft(name) and state.suggestions:
         why = f"no column of the log is {name}: taken as stopped"
         state.find("command not logged", (), GUESSED, why)
-        unit = SIGNALS[signal_of(name)].read_in
-        yield Suggestion(name, state.suggestions[0].source, unit, GUESSED, why, {"factor": 0.0})
+        source, unit = state.suggestions[0].source, SIGNALS[signal_of(name)].read_in
+        yield Suggestion(name, source, unit, GUESSED, why, {"factor": 0.0})
         return
     state.ask((signal_of(name),), f"which column is {name}? {vessel.name} needs it")
 

@@ -385,14 +385,18 @@ def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
     known = len(units) == 1 and units <= UNITS["rev/s"].keys()
     zeros = {name: _neutral_value(state, name) for name in pair}
     if not known:
-        words = f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor"
-        state.ask(("n",), words)
+        state.ask(
+            ("n",), f"{both} turn the ship by their difference. Of which shaft speed is a value of 1? Write factor"
+        )
         if not all(why for _, why in zeros.values()):
             guesses = " and ".join(f"{zero:g}" for zero, _ in zeros.values())
             words = f"which value of {both} is a stopped screw? {guesses} is a guess: write offset = -factor * value"
             state.ask(("n",), words)
     if not by_name:
-        state.ask(("n",), f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard")
+        state.ask(
+            ("n", "force"),
+            f"is {pair[0]!r} to port and {pair[1]!r} to starboard? More of the first turns to starboard",
+        )
     for side, name in zip(("port", "starboard"), pair, strict=True):
         zero, seen = zeros[name]
         extra = {} if known else {"factor": 1.0} | ({"offset": -zero} if zero else {})

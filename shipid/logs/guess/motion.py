@@ -120,7 +120,7 @@ def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], se
     elif best.rivals:
         sides = "; port and starboard change places" * any(axes.hand != one.hand for one in best.rivals)
         said = ", or ".join([f"is {words}", *(_reading_in_words(best, one) for one in best.rivals)])
-        words = f"{said}? MotionReading is the same in all{sides}: answer with --frame ned, enu, zup or ros"
+        words = f"{said}? The motion is the same in all{sides}: answer with --frame ned, enu, zup or ros"
         state.ask(("psi", "north", "east"), words)
 
 

@@ -14,6 +14,9 @@ from shipid.logs.guess.words import number_in_name
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.template import Particulars, first_guess
+from shipid.vessel.usv import SmallCraft, guess_craft
+from tests.drawn import seeds
+from tests.logs.guess.test_twin_screws import craft, guessed
 from tests.logs.simulated import si_log, state_with_pose
 
 LOG = si_log()
@@ -173,3 +176,46 @@ def test_the_sign_of_an_azimuth_unit_is_that_of_its_place(x: float, turns: float
     signs = {one.name: one.extra.get("sign", 1) for one in state.suggestions if one.name.endswith("alpha")}
     assert signs == dict.fromkeys(("port.alpha", "starboard.alpha"), turns)
     assert ("other sign" in {one.kind for one in state.findings}) == (turns < 0)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 3))
+@pytest.mark.parametrize("neutral", [1500.0, 0.0])
+@pytest.mark.parametrize("names", [("pwm_port", "pwm_stbd"), ("RCOU.C1", "RCOU.C3")])
+def test_throttles_without_a_unit_are_forces_within_the_limits_of_a_small_craft(
+    seed: int, neutral: float, names: tuple[str, str]
+) -> None:
+    """Nothing at neutral, the vessel's limits at the ends, more for more; the factor of a shaft speed is not asked."""
+    log, far = craft(seed), 400.0 if neutral else 100.0
+    sides = ("port", "starboard")
+    pair = {name: neutral + far * log[side].to_numpy() for name, side in zip(names, sides, strict=True)}
+    ship = guess_craft(
+        SmallCraft(2.0, 1.0, 80.0, 2.5, ((-0.8, -0.4), (-0.8, 0.4)), thrust=55.0), "craft", "c.toml"
+    ).vessel
+    state = guessed(log, pair)
+    name_commands(state, ship)
+    assert {one.name: one.source for one in state.suggestions} == {
+        "port.force": names[0],
+        "starboard.force": names[1],
+    }
+    for one in state.suggestions:
+        ends, forces = np.array(one.extra["curve"]).T
+        actuator = f"thruster.{one.name.replace('.', '.actuator.')}"
+        assert np.interp(neutral, ends, forces) == 0.0
+        assert (np.diff(forces) > 0).all()
+        limits = [ship.parameters[f"{actuator}.{end}"] for end in ("low", "high")]
+        assert forces[[0, -1]] == pytest.approx(limits, rel=1e-3)
+        assert ends[0] <= pair[one.source].min()
+        assert pair[one.source].max() <= ends[-1]
+        assert one.unit == "N"
+    of_sides = [("n", "force")] * (names[0] == "RCOU.C1")  # no name says them
+    assert [each.about for each in state.questions] == [*of_sides, ("force",), ("force",)]
+
+
+def test_a_servo_is_the_swivel_of_an_outboard_with_the_sign_that_turns_it() -> None:
+    ship = guess_craft(SmallCraft(2.0, 1.0, 80.0, 2.5, ((-0.8, 0.0),), swivel=35.0), "craft", "craft.toml").vessel
+    state, names = drafted({"steering_pwm": 1500.0 + 600.0 * ALPHA, "throttle_pwm": 1500.0 + 20.0 * N}, ship)
+    assert names == {"middle.alpha": "steering_pwm", "middle.force": "throttle_pwm"}
+    angle = next(one for one in state.suggestions if one.name == "middle.alpha")
+    assert np.array(angle.extra["curve"])[[0, -1], 1] == pytest.approx([-35.0, 35.0])
+    turned = np.sign(np.corrcoef(R, ALPHA)[0, 1])
+    assert angle.extra.get("sign", 1) == -turned  # an angle astern of the middle turns the craft the other way
