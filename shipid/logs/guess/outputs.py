@@ -33,7 +33,6 @@ def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
     """
     used: dict[str, int] = {}
     commands = [one.name for one in state.suggestions if is_command(one.name)]
-    ordered = "force" in SIGNALS and not any(map(is_shaft, commands))
     for name, signal in chosen.items():
         row, usual = SIGNALS[signal], SIGNALS[signal].component
         shafts = SIGNALS["n"].component == usual
@@ -44,7 +43,7 @@ def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
         if unit is None:
             state.ask((signal,), f"in which unit is {name!r}, up to {top:.4g}? {row.unit} is a guess")
         sure, why = 0.8 if unit else 0.4, f"by its name; up to {top:.4g}"
-        if signal == "thrust" and ordered:
+        if signal == "thrust" and not any(map(is_shaft, commands)):
             state.ask(
                 ("force", "thrust"), f"is {name!r} the thrust that is ordered, or what is measured? Order is a guess"
             )

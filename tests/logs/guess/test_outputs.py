@@ -13,9 +13,12 @@ FORCE = 1000.0 + 10 * np.sin(0.1 * LOG["t"].to_numpy())
 
 
 def told(**columns: np.ndarray) -> dict[str, tuple[str, str]]:
+    """Outputs that are drafted in a log whose shaft speed is known: name -> column, unit."""
     state = state_with_pose(columns)
-    suggest_outputs(state, reserve_outputs(state))
-    return {one.name: (one.source, one.unit) for one in state.suggestions}
+    chosen = reserve_outputs(state)
+    state.suggest("propeller.n", "rpm", "rpm", 1.0, "known")
+    suggest_outputs(state, chosen)
+    return {one.name: (one.source, one.unit) for one in state.suggestions if one.source != "rpm"}
 
 
 @pytest.mark.parametrize(
@@ -50,10 +53,11 @@ def test_a_name_says_an_output_and_its_unit(name: str, expected: tuple[str, str]
     assert told(**{name: FORCE}) == ({} if expected is None else {expected[0]: (name, expected[1])})
 
 
-def test_a_unit_that_nobody_says_is_asked_for() -> None:
+def test_a_thrust_without_a_shaft_may_be_an_order_and_its_unit_is_asked_for() -> None:
     state = state_with_pose({"thrust": FORCE})
     suggest_outputs(state, reserve_outputs(state))
-    assert [question.about for question in state.questions] == [("thrust",)]
+    assert [question.about for question in state.questions] == [("thrust",), ("force", "thrust")]
+    assert [(one.name, one.source) for one in state.suggestions] == [("propeller.force", "thrust")]
 
 
 def test_an_output_belongs_to_the_only_shaft() -> None:
