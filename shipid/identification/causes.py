@@ -67,7 +67,7 @@ class Cause:
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
     repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
-    cost : what its free signs add to the misfit.
+    cost : what its free signs add to the misfit, or numbers that parts left out do not judge (Akaike).
     """
 
     key: str
@@ -165,8 +165,9 @@ def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
 
 
 def _add_current(run: NDArray[np.intp], motion: Motion, size: Array) -> Motion:
-    """The log in the currents, north and then east of each [m/s], of which a step (N,) has number `run`."""
+    """The log in further currents, north and then east of each [m/s], of which a step (N,) has number `run`."""
     current = (size[: len(size) // 2] + 1j * size[len(size) // 2 :])[run]
+    current = current + motion.columns.get("V_c", 0.0) * np.exp(1j * motion.columns.get("beta_c", 0.0))
     return motion.put({"V_c": np.abs(current), "beta_c": np.angle(current)})
 
 
@@ -303,7 +304,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     if count > 1:
         yield Cause(
             "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
-            repair='--set current="by run"', equals=equals, tells=COURSES,
+            repair='--set current="by run"', equals=equals, tells=COURSES, cost=2.0 * count,
         )  # fmt: skip
     yield Cause(
         "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),

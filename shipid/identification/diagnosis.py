@@ -44,10 +44,11 @@ The causes of least misfit also predict paths of 2.5 ship lengths, whose errors 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
@@ -99,7 +100,8 @@ class Diagnosis:
     cause : key, `none` or `cannot tell`. equals : keys that the log does not tell from it.
     size : of the cause in SI units, an empty tuple where it has none (a sign). interval : 95 %, (low, high) of each.
     repair : lines for the mapping of the log, the vessel or the settings of an identification.
-    sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s] that it explains.
+    sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s], less that of the
+        noise, that it explains.
     next : the same of a second cause beside the first, if there is one.
     misfits : key -> misfit on parts left out, less that of `none`.
     """
@@ -134,7 +136,7 @@ class _Log:
     length: float | None = None
     plain = PLAIN
     commands: tuple[str, ...] = ()
-    environment: tuple[str, ...] = ()
+    environment: Mapping[str, float] = MappingProxyType({})
     numbers: tuple[float, ...] = ()
 
     def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
@@ -194,8 +196,8 @@ class _Log:
         shared = set.intersection(*(set(part) for part in parts))
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
         columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
-        zero = np.zeros(int(ends[-1]))
-        columns |= {name: zero for name in self.environment if name not in columns}
+        rest = self.environment.keys() - columns.keys()
+        columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in sorted(rest)}
         slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
 
@@ -247,7 +249,13 @@ class _Log:
         velocity = [pulled * white(name) for name in ("u", "v", "r")]
         place = pulled * max(white("north"), white("east"))
         heading = summed * speed * white("psi")
-        self.blur = float(np.hypot(max(white("north"), white("east")), 0.1 * EXACT * self.scales.length))
+        fix = max(white("north"), white("east"))
+        self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
+        ahead = self.step * AHEAD
+        way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
+        self.blind = float(
+            np.linalg.norm([2**0.5 * self.blur, *(way * [white(name) for name in ("u", "v", "psi", "r")])])
+        )
         turning = np.hypot(pulled * white("psi"), summed * white("r"))
         along, across = (np.hypot(place, summed * white(name)) for name in ("u", "v"))
         noise = [*velocity, turning, along, np.hypot(across, heading)]
@@ -312,6 +320,10 @@ class _Log:
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
         return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
 
+    def beyond_noise(self, errors: Array) -> float:
+        """Mean error [m] of paths without what the noise of the log makes of it."""
+        return float(np.sqrt(max(errors.mean() ** 2 - self.blind**2, self.blur**2)))
+
     def weights(self, z: Array) -> Array:
         """Inverse of the level (6,) of residuals."""
         return np.asarray(1 / np.sqrt((z**2).mean(axis=1) + self.noise**2))
@@ -319,7 +331,8 @@ class _Log:
     def _step(self, J: Array, z: Array, kept: NDArray[np.bool_]) -> Array:
         weight = self.weights(z[:, kept])[:, None]
         A = (J[:, :, kept] * weight).reshape(len(J), -1).T
-        size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+        size = np.linalg.norm(A, axis=0)
+        size = np.where(size > 1e-9 * size.max(initial=0.0), size, np.inf)  # what these bumps do not show stays
         return np.asarray(-np.linalg.lstsq(A / size, (z[:, kept] * weight).ravel(), rcond=1e-6)[0] / size)
 
     def _covariance(self, J: Array, z: Array) -> Array:
@@ -356,11 +369,12 @@ class _VesselLog(_Log):
 
     plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
-    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
+    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str], environment: Mapping[str, float]) -> None:
         if "current" not in vessel.document:
             vessel = vessel.with_values({"current.kind": "uniform"})
         self.vessel, self.model = vessel, vessel_dynamics(vessel)
-        self.length, self.commands, self.environment = vessel.length, self.model.commands, self.model.environment
+        self.length, self.commands = vessel.length, self.model.commands
+        self.environment = {name: environment.get(name, 0.0) for name in self.model.environment}
         self.numbers = tuple(vessel.parameters.values())
         missing = next((name for name in self.commands if name not in dataset.commands), None)
         if missing is not None:
@@ -515,14 +529,23 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
             )
 
 
-def diagnose(vessel: Vessel | None, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
-    """Find what is wrong with a vessel and a log of it, or with a log alone; runs : names, default: all.
+def diagnose(
+    vessel: Vessel | None,
+    dataset: Dataset,
+    runs: Sequence[str] | None = None,
+    keys: Collection[str] | None = None,
+    environment: Mapping[str, float] | None = None,
+) -> Diagnosis:
+    """Find what is wrong with a vessel and a log of it, or with a log alone.
+
+    runs : names; default: all. keys : causes to compare; default: all. environment : channel, such as V_c -> value [SI]
+    where the data have none; default: 0.
 
     Raises DataError where a command is missing, or no stretch is long enough.
     """
     names = list(dataset.runs if runs is None else runs)
-    log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names)
-    causes = log.causes()
+    log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
+    causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
     first, cause = _judge(log, causes)
     if cause is None:
         return first
@@ -547,9 +570,9 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     best = fits[order[0]]
     cause, theta = best.cause, best.theta
     gain, error = log.gain(plain, seen[order[0]])
-    share = 1 - float(seen[order[0]][1].mean() / max(plain[1].mean(), log.blur))
     ahead, missed = log.step * AHEAD, float(plain[1].mean())
-    how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average"
+    share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
+    how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average (noise alone: {log.blind:.2g} m)"
     result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{how_far}, and no single cause explains that")
     least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
@@ -573,7 +596,7 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
     words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
     sentence = f"{name}{' = ' * bool(words)}{', '.join(words)}{' ' * (len(cause.unit) > 1)}{cause.unit.strip('1')}"
-    sentence = f"{how_far}: {sentence} explains {percent_text(share)} of that; {' '.join(repair.split())}"
+    sentence = f"{how_far}: {sentence} explains {percent_text(share)} of what is no noise; {' '.join(repair.split())}"
     sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
     return replace(
         result, cause=name, equals=equals, size=sizes, interval=interval, repair=repair, sentence=sentence

@@ -519,9 +519,8 @@ def names_cause(key: str, cause: str) -> bool:
 
 def diagnose_log(log: FaultyLog, folder: Path) -> tuple[list[str], list[str]]:
     """Write the document and the dataset, diagnose them: the named causes (`none` apart), and all their equals."""
-    from shipid.identification.diagnosis import diagnose
-
     from shipid import Dataset, load_vessel, read_dataset, write_dataset  # what is judged, and its formats
+    from shipid.identification.diagnosis import diagnose
 
     document, table = folder / "drawn.toml", folder / "drawn.parquet"
     document.write_text(vessel_document(log))
