@@ -67,7 +67,7 @@ class Cause:
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
     repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
-    cost : what its free signs add to the misfit, or numbers that parts left out do not judge (Akaike).
+    cost : what its free signs add to the misfit.
     """
 
     key: str
@@ -304,7 +304,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     if count > 1:
         yield Cause(
             "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
-            repair='--set current="by run"', equals=equals, tells=COURSES, cost=2.0 * count,
+            repair='--set current="by run"', equals=equals, tells=COURSES,
         )  # fmt: skip
     yield Cause(
         "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),

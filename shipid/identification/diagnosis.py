@@ -39,7 +39,8 @@ The causes of least misfit also predict paths of 2.5 ship lengths, whose errors 
 - The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
   the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
   and `equals` are the causes that remain.
-- A second cause is looked for in the same way once the log is repaired from the first.
+- A second cause is looked for in the same way once the log is repaired from the first; then each is fitted beside the
+  other.
 """
 
 from __future__ import annotations
@@ -102,7 +103,8 @@ class Diagnosis:
     repair : lines for the mapping of the log, the vessel or the settings of an identification.
     sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s], less that of the
         noise, that it explains.
-    next : the same of a second cause beside the first, if there is one.
+    noise : mean error [m] of these paths by the noise of the log alone.
+    next : the same of a second cause beside the first, if there is one; sizes are those beside each other.
     misfits : key -> misfit on parts left out, less that of `none`.
     """
 
@@ -114,9 +116,16 @@ class Diagnosis:
     sentence: str = ""
     share: float = 0.0
     error: float = 0.0
+    noise: float = 0.0
     ahead: float = 0.0
     next: Diagnosis | None = None
     misfits: Mapping[str, float] | None = None
+
+    @property
+    def how_far(self) -> str:
+        """The error of the paths in words."""
+        noise = f"noise alone: {self.noise:.2g} m"
+        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average ({noise})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,9 +212,8 @@ class _Log:
 
     def _cut(self, duration: float) -> None:
         """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
-        begins, blocks, folds = list[Steps](), list[Steps](), list[Steps]()
+        begins, blocks, runs = list[Steps](), list[Steps](), list[Steps]()
         first = 0
-        several = len(set(self.motion.runs)) >= FOLDS
         every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
         for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
             here = np.arange(part.start, part.stop - POINTS - 1, every)
@@ -213,10 +221,11 @@ class _Log:
             begins.append(here)
             blocks.append(number + first)
             first += int(number.max(initial=-1)) + 1
-            folds.append(np.full(len(here), run % FOLDS) if several else number % FOLDS)
+            runs.append(np.full(len(here), run % FOLDS))
         begin = np.concatenate(begins)
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
-        self.block, self.fold = np.concatenate(blocks), np.concatenate(folds)
+        self.block = np.concatenate(blocks)
+        self.fold = np.concatenate(runs) if len(set(self.motion.runs)) >= FOLDS else self.block % FOLDS
         self.paths = np.concatenate(
             [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
         ).astype(int)
@@ -313,8 +322,10 @@ class _Log:
             if (np.abs(step) < SETTLED * np.abs(trials)).all():
                 break
         left = z.copy()
+        shown = [np.abs(J[:, :, self.fold != fold]).any(axis=(1, 2)).all() for fold in range(FOLDS)]
+        folds = self.fold if all(shown) else self.block % FOLDS  # a number of one run is judged within that run
         for fold in range(FOLDS) if len(theta) else ():
-            out = self.fold == fold
+            out = folds == fold
             if out.any() and not out.all():
                 step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
@@ -546,17 +557,23 @@ def diagnose(
     names = list(dataset.runs if runs is None else runs)
     log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
     causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
-    first, cause = _judge(log, causes)
-    if cause is None:
+    first, fit = _judge(log, causes)
+    if fit is None:
         return first
-    log.repair(log.estimate(cause).motion)
-    second = _judge(log, [one for one in causes if one.key != cause.key])[0]
-    both = f"{first.sentence}; without that, {second.sentence}"
-    return replace(first, sentence=both, next=second)
+    motion = log.motion
+    log.repair(fit.motion)
+    second, other = _judge(log, [one for one in causes if one.key != fit.cause.key])
+    if other is not None:
+        log.repair(other.cause.change(motion, other.theta))  # each beside the other
+        fit = log.estimate(fit.cause)
+        log.repair(fit.cause.change(motion, fit.theta))
+        other = log.estimate(other.cause)
+        first, second = _describe(first, fit), _describe(second, other)
+    return replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
 
 
-def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]:
-    """The best of all causes as a diagnosis, and the cause where it is named."""
+def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
+    """The best of all causes as a diagnosis, and its fit where it is named."""
     base = log.residuals(log.motion)
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
@@ -572,9 +589,8 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     gain, error = log.gain(plain, seen[order[0]])
     ahead, missed = log.step * AHEAD, float(plain[1].mean())
     share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
-    how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average (noise alone: {log.blind:.2g} m)"
-    result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
-    result = replace(result, sentence=f"{how_far}, and no single cause explains that")
+    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
+    result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
     shown = (
         gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
@@ -587,20 +603,28 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     name = cause.key.partition(" / ")[0]
     if set(near) - {name, *cause.equals}:
         alike = (name, *(key for key in near if key != name))
-        sentence = f"{how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
+        sentence = f"{result.how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
         return replace(result, cause=UNCLEAR, equals=alike, sentence=_with_remedy(sentence, cause.tells)), None
-    ends = (cause.sizes(theta - 1.96 * best.errors), cause.sizes(theta + 1.96 * best.errors))
     unfitted = [key for key in cause.equals if key not in fits]
     equals = tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name)
+    return _describe(replace(result, cause=name, equals=equals), best), best
+
+
+def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
+    """A diagnosis with the size, the interval, the repair and the sentence of the fit of its cause."""
+    cause, theta, equals = fit.cause, fit.theta, result.equals
+    ends = (cause.sizes(theta - 1.96 * fit.errors), cause.sizes(theta + 1.96 * fit.errors))
     interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
     words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
-    sentence = f"{name}{' = ' * bool(words)}{', '.join(words)}{' ' * (len(cause.unit) > 1)}{cause.unit.strip('1')}"
-    sentence = f"{how_far}: {sentence} explains {percent_text(share)} of what is no noise; {' '.join(repair.split())}"
+    sentence = (
+        f"{result.how_far}: {result.cause}{' = ' * bool(words)}{', '.join(words)}{' ' * bool(cause.unit.strip('1'))}"
+    )
+    sentence += (
+        f"{cause.unit.strip('1')} explains {percent_text(result.share)} of what is no noise; {' '.join(repair.split())}"
+    )
     sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
-    return replace(
-        result, cause=name, equals=equals, size=sizes, interval=interval, repair=repair, sentence=sentence
-    ), cause
+    return replace(result, size=sizes, interval=interval, repair=repair, sentence=sentence)
 
 
 def _with_remedy(sentence: str, tells: str) -> str:
