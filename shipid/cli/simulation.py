@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +13,7 @@ from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, MOTION, MOTION_FORMATS
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.files import TABLES
 
 
@@ -159,8 +160,8 @@ def replay_command(
 ) -> None:
     """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
     from shipid.data.windows import gaps_in_words
+    from shipid.identification.diagnosis import diagnose
     from shipid.identification.free_run import missing_inputs, simulate_free_runs
-    from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
     from shipid.identification.segments import too_short
     from shipid.report.motion import REPLAYED, ReplayContent, write_replay
@@ -176,7 +177,9 @@ def replay_command(
     replayed = simulate_free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
     zero = missing_inputs(ship, log, settings, chosen)
     holes = gaps_in_words(log.select(chosen), step)
-    late = late_commands(ship, log, chosen) if commands == "held" else None
+    found = ""
+    with suppress(DataError):  # of runs too short for it the errors say all there is
+        found = diagnose(ship, log, chosen).sentence
     errors = replayed.errors.drop(columns="model")
     timing = "; commands change between rows" if commands == "between" else ""
     content = ReplayContent(
@@ -200,11 +203,9 @@ def replay_command(
             f"not in the log, taken as 0: {', '.join(zero)}" if zero else "",
             f"too short, left out: {', '.join(left_out)}" if left_out else "",
             f"{holes}: orders are held there" if holes else "",
-            f"{late.words}: the turns are late; compare with --commands between" if late is not None else "",
+            found,
         ]
-        answer.say(
-            "\n".join(filter(None, notes)), assumed=zero, left_out=left_out, gaps=holes, late=late and late.words
-        )
+        answer.say("\n".join(filter(None, notes)), assumed=zero, left_out=left_out, gaps=holes, diagnosis=found)
         answer.records("errors", errors, {"run": "run"} | MOTION, MOTION_FORMATS)
         answer.save("motions", csv, replayed.series)
         page = write_replay(content, file)

@@ -165,8 +165,9 @@ def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
 
 
 def _add_current(run: NDArray[np.intp], motion: Motion, size: Array) -> Motion:
-    """The log in the currents, north and then east of each [m/s], of which a step (N,) has number `run`."""
+    """The log in further currents, north and then east of each [m/s], of which a step (N,) has number `run`."""
     current = (size[: len(size) // 2] + 1j * size[len(size) // 2 :])[run]
+    current = current + motion.columns.get("V_c", 0.0) * np.exp(1j * motion.columns.get("beta_c", 0.0))
     return motion.put({"V_c": np.abs(current), "beta_c": np.angle(current)})
 
 

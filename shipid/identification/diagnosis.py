@@ -39,15 +39,17 @@ The causes of least misfit also predict paths of 2.5 ship lengths, whose errors 
 - The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
   the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
   and `equals` are the causes that remain.
-- A second cause is looked for in the same way once the log is repaired from the first.
+- A second cause is looked for in the same way once the log is repaired from the first; then each is fitted beside the
+  other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
@@ -99,8 +101,10 @@ class Diagnosis:
     cause : key, `none` or `cannot tell`. equals : keys that the log does not tell from it.
     size : of the cause in SI units, an empty tuple where it has none (a sign). interval : 95 %, (low, high) of each.
     repair : lines for the mapping of the log, the vessel or the settings of an identification.
-    sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s] that it explains.
-    next : the same of a second cause beside the first, if there is one.
+    sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s], less that of the
+        noise, that it explains.
+    noise : mean error [m] of these paths by the noise of the log alone.
+    next : the same of a second cause beside the first, if there is one; sizes are those beside each other.
     misfits : key -> misfit on parts left out, less that of `none`.
     """
 
@@ -112,9 +116,16 @@ class Diagnosis:
     sentence: str = ""
     share: float = 0.0
     error: float = 0.0
+    noise: float = 0.0
     ahead: float = 0.0
     next: Diagnosis | None = None
     misfits: Mapping[str, float] | None = None
+
+    @property
+    def how_far(self) -> str:
+        """The error of the paths in words."""
+        noise = f"noise alone: {self.noise:.2g} m"
+        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average ({noise})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +145,7 @@ class _Log:
     length: float | None = None
     plain = PLAIN
     commands: tuple[str, ...] = ()
-    environment: tuple[str, ...] = ()
+    environment: Mapping[str, float] = MappingProxyType({})
     numbers: tuple[float, ...] = ()
 
     def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
@@ -194,16 +205,15 @@ class _Log:
         shared = set.intersection(*(set(part) for part in parts))
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
         columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
-        zero = np.zeros(int(ends[-1]))
-        columns |= {name: zero for name in self.environment if name not in columns}
+        rest = self.environment.keys() - columns.keys()
+        columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in sorted(rest)}
         slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
 
     def _cut(self, duration: float) -> None:
         """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
-        begins, blocks, folds = list[Steps](), list[Steps](), list[Steps]()
+        begins, blocks, runs = list[Steps](), list[Steps](), list[Steps]()
         first = 0
-        several = len(set(self.motion.runs)) >= FOLDS
         every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
         for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
             here = np.arange(part.start, part.stop - POINTS - 1, every)
@@ -211,10 +221,11 @@ class _Log:
             begins.append(here)
             blocks.append(number + first)
             first += int(number.max(initial=-1)) + 1
-            folds.append(np.full(len(here), run % FOLDS) if several else number % FOLDS)
+            runs.append(np.full(len(here), run % FOLDS))
         begin = np.concatenate(begins)
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
-        self.block, self.fold = np.concatenate(blocks), np.concatenate(folds)
+        self.block = np.concatenate(blocks)
+        self.fold = np.concatenate(runs) if len(set(self.motion.runs)) >= FOLDS else self.block % FOLDS
         self.paths = np.concatenate(
             [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
         ).astype(int)
@@ -247,7 +258,13 @@ class _Log:
         velocity = [pulled * white(name) for name in ("u", "v", "r")]
         place = pulled * max(white("north"), white("east"))
         heading = summed * speed * white("psi")
-        self.blur = float(np.hypot(max(white("north"), white("east")), 0.1 * EXACT * self.scales.length))
+        fix = max(white("north"), white("east"))
+        self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
+        ahead = self.step * AHEAD
+        way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
+        self.blind = float(
+            np.linalg.norm([2**0.5 * self.blur, *(way * [white(name) for name in ("u", "v", "psi", "r")])])
+        )
         turning = np.hypot(pulled * white("psi"), summed * white("r"))
         along, across = (np.hypot(place, summed * white(name)) for name in ("u", "v"))
         noise = [*velocity, turning, along, np.hypot(across, heading)]
@@ -305,12 +322,18 @@ class _Log:
             if (np.abs(step) < SETTLED * np.abs(trials)).all():
                 break
         left = z.copy()
+        shown = [np.abs(J[:, :, self.fold != fold]).any(axis=(1, 2)).all() for fold in range(FOLDS)]
+        folds = self.fold if all(shown) else self.block % FOLDS  # a number of one run is judged within that run
         for fold in range(FOLDS) if len(theta) else ():
-            out = self.fold == fold
+            out = folds == fold
             if out.any() and not out.all():
                 step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
         return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
+
+    def beyond_noise(self, errors: Array) -> float:
+        """Mean error [m] of paths without what the noise of the log makes of it."""
+        return float(np.sqrt(max(errors.mean() ** 2 - self.blind**2, self.blur**2)))
 
     def weights(self, z: Array) -> Array:
         """Inverse of the level (6,) of residuals."""
@@ -319,7 +342,8 @@ class _Log:
     def _step(self, J: Array, z: Array, kept: NDArray[np.bool_]) -> Array:
         weight = self.weights(z[:, kept])[:, None]
         A = (J[:, :, kept] * weight).reshape(len(J), -1).T
-        size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+        size = np.linalg.norm(A, axis=0)
+        size = np.where(size > 1e-9 * size.max(initial=0.0), size, np.inf)  # what these bumps do not show stays
         return np.asarray(-np.linalg.lstsq(A / size, (z[:, kept] * weight).ravel(), rcond=1e-6)[0] / size)
 
     def _covariance(self, J: Array, z: Array) -> Array:
@@ -356,11 +380,12 @@ class _VesselLog(_Log):
 
     plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
-    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> None:
+    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str], environment: Mapping[str, float]) -> None:
         if "current" not in vessel.document:
             vessel = vessel.with_values({"current.kind": "uniform"})
         self.vessel, self.model = vessel, vessel_dynamics(vessel)
-        self.length, self.commands, self.environment = vessel.length, self.model.commands, self.model.environment
+        self.length, self.commands = vessel.length, self.model.commands
+        self.environment = {name: environment.get(name, 0.0) for name in self.model.environment}
         self.numbers = tuple(vessel.parameters.values())
         missing = next((name for name in self.commands if name not in dataset.commands), None)
         if missing is not None:
@@ -515,25 +540,40 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
             )
 
 
-def diagnose(vessel: Vessel | None, dataset: Dataset, runs: Sequence[str] | None = None) -> Diagnosis:
-    """Find what is wrong with a vessel and a log of it, or with a log alone; runs : names, default: all.
+def diagnose(
+    vessel: Vessel | None,
+    dataset: Dataset,
+    runs: Sequence[str] | None = None,
+    keys: Collection[str] | None = None,
+    environment: Mapping[str, float] | None = None,
+) -> Diagnosis:
+    """Find what is wrong with a vessel and a log of it, or with a log alone.
+
+    runs : names; default: all. keys : causes to compare; default: all. environment : channel, such as V_c -> value [SI]
+    where the data have none; default: 0.
 
     Raises DataError where a command is missing, or no stretch is long enough.
     """
     names = list(dataset.runs if runs is None else runs)
-    log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names)
-    causes = log.causes()
-    first, cause = _judge(log, causes)
-    if cause is None:
+    log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
+    causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
+    first, fit = _judge(log, causes)
+    if fit is None:
         return first
-    log.repair(log.estimate(cause).motion)
-    second = _judge(log, [one for one in causes if one.key != cause.key])[0]
-    both = f"{first.sentence}; without that, {second.sentence}"
-    return replace(first, sentence=both, next=second)
+    motion = log.motion
+    log.repair(fit.motion)
+    second, other = _judge(log, [one for one in causes if one.key != fit.cause.key])
+    if other is not None:
+        log.repair(other.cause.change(motion, other.theta))  # each beside the other
+        fit = log.estimate(fit.cause)
+        log.repair(fit.cause.change(motion, fit.theta))
+        other = log.estimate(other.cause)
+        first, second = _describe(first, fit), _describe(second, other)
+    return replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
 
 
-def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]:
-    """The best of all causes as a diagnosis, and the cause where it is named."""
+def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
+    """The best of all causes as a diagnosis, and its fit where it is named."""
     base = log.residuals(log.motion)
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
@@ -547,11 +587,10 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     best = fits[order[0]]
     cause, theta = best.cause, best.theta
     gain, error = log.gain(plain, seen[order[0]])
-    share = 1 - float(seen[order[0]][1].mean() / max(plain[1].mean(), log.blur))
     ahead, missed = log.step * AHEAD, float(plain[1].mean())
-    how_far = f"paths over {ahead:.3g} s err by {missed:.3g} m on average"
-    result = Diagnosis(NONE, share=share, error=missed, ahead=ahead, misfits=misfits)
-    result = replace(result, sentence=f"{how_far}, and no single cause explains that")
+    share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
+    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
+    result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
     shown = (
         gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
@@ -564,20 +603,28 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, Cause | None]
     name = cause.key.partition(" / ")[0]
     if set(near) - {name, *cause.equals}:
         alike = (name, *(key for key in near if key != name))
-        sentence = f"{how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
+        sentence = f"{result.how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
         return replace(result, cause=UNCLEAR, equals=alike, sentence=_with_remedy(sentence, cause.tells)), None
-    ends = (cause.sizes(theta - 1.96 * best.errors), cause.sizes(theta + 1.96 * best.errors))
     unfitted = [key for key in cause.equals if key not in fits]
     equals = tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name)
+    return _describe(replace(result, cause=name, equals=equals), best), best
+
+
+def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
+    """A diagnosis with the size, the interval, the repair and the sentence of the fit of its cause."""
+    cause, theta, equals = fit.cause, fit.theta, result.equals
+    ends = (cause.sizes(theta - 1.96 * fit.errors), cause.sizes(theta + 1.96 * fit.errors))
     interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
     words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
-    sentence = f"{name}{' = ' * bool(words)}{', '.join(words)}{' ' * (len(cause.unit) > 1)}{cause.unit.strip('1')}"
-    sentence = f"{how_far}: {sentence} explains {percent_text(share)} of that; {' '.join(repair.split())}"
+    sentence = (
+        f"{result.how_far}: {result.cause}{' = ' * bool(words)}{', '.join(words)}{' ' * bool(cause.unit.strip('1'))}"
+    )
+    sentence += (
+        f"{cause.unit.strip('1')} explains {percent_text(result.share)} of what is no noise; {' '.join(repair.split())}"
+    )
     sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
-    return replace(
-        result, cause=name, equals=equals, size=sizes, interval=interval, repair=repair, sentence=sentence
-    ), cause
+    return replace(result, size=sizes, interval=interval, repair=repair, sentence=sentence)
 
 
 def _with_remedy(sentence: str, tells: str) -> str:

@@ -3,60 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, mean_commands, sample_columns
-from shipid.physics.signals import is_steering
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Changes = Literal["held", "between"]
 """When commands change: at the row that has them, until the next; or between that row and the one before."""
 COARSE = 1.5  # rows: a longer step loses changes of the commands, and has a warning of its own
-CONSIDERABLE = 0.006  # of the time in which a ship goes her length: so late, N_v came out 2 % wrong in zigzags
-
-
-@dataclass(frozen=True)
-class LateCommands:
-    """Commands that steer and change between rows. interval : of the rows [s]."""
-
-    interval: float
-
-    @property
-    def words(self) -> str:
-        """How late, for a sentence."""
-        when = f"commands count from their row, {self.delay:.3g} s late on average"
-        return f"rows are {self.interval:.3g} s apart and {when}"
-
-    @property
-    def delay(self) -> float:
-        """By how much commands are late on average [s]."""
-        return self.interval / 2
 
 
 def row_interval(dataset: Dataset, runs: Sequence[str]) -> float:
     """Median time from row to row of some runs [s]."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     return float(rows.groupby("run", sort=False)["t"].diff().median())
-
-
-def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> LateCommands | None:
-    """How late the commands of some runs come, where that is considerable for how fast the ship turns; else None.
-
-    A vessel without a length is not judged.
-    """
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    by_run = rows.groupby("run", sort=False)
-    steering = [name for name in vessel_dynamics(vessel).commands if is_steering(name) and name in rows]
-    steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
-    if not steering or vessel.length is None:
-        return None
-    late = LateCommands(row_interval(dataset, runs))
-    return late if late.delay * float(rows["u"].abs().mean()) / vessel.length >= CONSIDERABLE else None
 
 
 def interpolate_commands(

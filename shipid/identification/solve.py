@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +15,21 @@ from shipid.arguments import as_float_array, as_names, check_class, check_functi
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.identification.covariance import invert_information
+from shipid.identification.diagnosis import diagnose
 from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_factors, initial_point, search_factors
 from shipid.identification.late import COARSE, row_interval
-from shipid.identification.residuals import Problem, build_problem, typical_errors
-from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_columns
+from shipid.identification.residuals import CURRENT, Problem, build_problem, typical_errors
+from shipid.identification.settings import BLOCK, ENVIRONMENT, NUISANCES, Identify, run_overrides, weighted_columns
 from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
 from shipid.identification.statistics import LinearFit, residual_whiteness
-from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents
+from shipid.units import percent_text, significant_digits
 from shipid.vessel.load import Vessel
 
+CurrentKind = Literal["one", "by run"]
+CURRENT_KINDS: Mapping[str, CurrentKind] = {"current": "one", "current by run": "by run"}
+"""Cause of a diagnosis -> setting `current`."""
+LEAST_RUNS = 2  # of one run a current is as well a wrong vessel
 HALVINGS = 3  # of the default step, at most, as `study new` does
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
 UNEVEN = 0.01  # of the time between rows: a difference above it counts
@@ -107,43 +114,64 @@ def _fit_choosing_current(
     start: Mapping[str, float] | Solution | None,
     progress: Progress | None,
 ) -> Solution:
-    """The fit with the current of the settings, or with the one of least criterion after a fit without current.
+    """The fit with the current of the settings, or with that which a diagnosis of the fit without current names.
 
-    Currents by run are judged once more, about a fit with one of all runs: far from no current the motion is not linear
-    in it, and currents by run seem to make up for that, or are lost in it.
+    Currents by run are judged about a fit with one of all runs: far from it the numbers make up for a part of it.
     """
     wanted = "current" in settings.widths
     if settings.current != "chosen" or (wanted and len(runs) < LEAST_RUNS):
         return _fit_dropping_factors(vessel, dataset, runs, settings, start, progress)
     without = settings.model_copy(update={"current": "none"})
     solution = _fit_dropping_factors(vessel, dataset, runs, without, start, progress)
-    streams = estimate_currents(solution, dataset) if solution.status == "ok" else []
-    by_run = settings.model_copy(update={"current": "by run"})
-    if not streams:
-        asked = wanted and solution.status != "stopped"
-        return _fit_dropping_factors(vessel, dataset, runs, by_run, start, progress) if asked else solution
-    if min(streams[wanted:], key=lambda one: one.criterion).kind == "none":
+    if solution.status == "stopped":
         return solution
-    chosen = settings.model_copy(update={"current": "one"}).with_sizes(typical_errors(vessel, dataset, runs))
+    kind = _current_kind(solution, dataset)
+    if kind is None and not wanted:
+        return solution
     own = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
-    current = (streams[1].currents[0] / chosen.widths["current"]).tolist()
-    begin = own | dict(zip(NUISANCES["current"], current, strict=True))
-    again = _fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress)
-    fits = [solution, again]
-    closer = (estimate_currents(again, dataset) if again.status == "ok" else []) or streams[1:]
-    if again.status != "stopped" and closer[1].criterion < closer[0].criterion:
-        again = _fit_dropping_factors(vessel, dataset, runs, by_run, own, progress)
-        fits.append(again)
+    fits = [solution]
+    for one in ("one", "by run")[kind is None :]:
+        if one == "one" or kind is None or _current_kind(fits[-1], dataset) == one:
+            chosen = settings.model_copy(update={"current": one}).with_sizes(typical_errors(vessel, dataset, runs))
+            fits.append(_fit_dropping_factors(vessel, dataset, runs, chosen, own, progress))
+    again = fits[-1]
     if again.status not in ("ok", "stopped") and not wanted:
         failed = f"residuals look like those of a current, but the fit with it fails: {again.sentence}"
         return replace(solution, warnings=(*solution.warnings, failed))
-    said = () if wanted else (current_sentence(solution, again),)
+    said = () if wanted else (_current_sentence(solution, again),)
     return replace(
         again,
         warnings=(*again.warnings, *said),
         objective_start=solution.objective_start,
         iterations=sum(one.iterations for one in fits),
         seconds=sum(one.seconds for one in fits),
+    )
+
+
+def _current_kind(solution: Solution, dataset: Dataset) -> CurrentKind | None:
+    """The kind of current that the runs of a fit show beside what it has, if any; no run may have a known one."""
+    given = run_overrides(solution.settings, solution.runs)
+    known = any(key.endswith(f".{ENVIRONMENT}.{name}") for key in given for name in CURRENT)
+    if solution.status != "ok" or len(solution.runs) < LEAST_RUNS or known:
+        return None
+    with suppress(DataError, DocumentError):  # runs too short for a diagnosis; estimates that the vessel refuses
+        fitted, (north, east) = solution.vessel.with_values(solution.values), solution.common_current
+        there = {"V_c": float(np.hypot(north, east)), "beta_c": float(np.arctan2(east, north))}
+        return CURRENT_KINDS.get(diagnose(fitted, dataset, solution.runs, CURRENT_KINDS, there).cause)
+    return None
+
+
+def _current_sentence(before: Solution, after: Solution) -> str:
+    """What residuals without a current show, and how the fit after, with currents, may be chosen otherwise."""
+    which = {"one": "one current of all runs", "by run": "another current in each run"}[after.settings.current]
+    currents = [[of_run[name] for name in NUISANCES["current"]] for of_run in after.nuisances.values()]
+    size = np.sqrt(np.square(currents).sum(axis=1).mean())
+    explained = 1 - np.square(after.residuals).sum() / max(np.square(before.residuals).sum(), 1e-300)
+    return (
+        f"residuals look like those of {which}, {significant_digits(float(size), 2)} m/s, which takes "
+        f"{percent_text(float(explained))} of their squares away"
+        f"{', or of wind that the log lacks' if 'wind' in before.vessel.document else ''}: "
+        "it is estimated beside the numbers; compare with --set current=none"
     )
 
 

@@ -1,40 +1,15 @@
-"""Commands that change between rows: where that matters, and what they are meanwhile."""
+"""Commands that change between rows: what they are meanwhile."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from shipid.data.dataset import Dataset
-from shipid.identification.late import CONSIDERABLE, held_over_steps, interpolate_commands, late_commands
+from shipid.identification.late import held_over_steps, interpolate_commands
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
-from tests.identification.trials import trials
 
 SHIP = load_vessel("gunnerus-28.9")
-DATA = trials(SHIP, runs=2, steps=40)
-
-
-def at(interval: float) -> Dataset:
-    """The same rows, so far apart."""
-    return Dataset(DATA.frame.assign(t=DATA.frame["t"] * interval), DATA.metadata)
-
-
-def test_lateness_counts_by_how_fast_the_ship_goes_her_length() -> None:
-    late = late_commands(SHIP, at(1.0), DATA.runs)
-    assert late is not None
-    assert (late.interval, late.delay) == (1.0, 0.5)
-    assert late.words == "rows are 1 s apart and commands count from their row, 0.5 s late on average"
-    pace = float(DATA.frame["u"].abs().mean()) / SHIP.document["particulars"]["L_pp"]
-    edge = 2 * CONSIDERABLE / pace  # s between rows
-    assert late_commands(SHIP, at(1.01 * edge), DATA.runs) is not None
-    assert late_commands(SHIP, at(0.99 * edge), DATA.runs) is None
-
-
-def test_orders_that_never_change_are_not_late() -> None:
-    steering = [name for name in DATA.commands if name.endswith(".alpha")]
-    held = Dataset(DATA.frame.assign(**dict.fromkeys(steering, 0.1)), DATA.metadata)
-    assert late_commands(SHIP, held, held.runs) is None
 
 
 def test_at_the_rows_and_in_the_middle_between_them() -> None:

@@ -14,7 +14,6 @@ from shipid.identification.settings import Identify
 from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, fit_statistics
-from shipid.identification.stream import estimate_currents
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, noisy, trials
 
@@ -107,8 +106,7 @@ def test_logs_without_a_current_are_given_none() -> None:
     sound = log_of(1)
     assert fitted(sound).settings.current == "none"
     late = changed(sound, **{name: np.roll(sound.frame[name].to_numpy(), 2) for name in sound.commands})
-    solution = fitted(late, current="none")
-    assert all(np.abs(one.currents).max() < 0.1 for one in estimate_currents(solution, late))
+    assert fitted(late).settings.current == "none"
 
 
 def test_a_current_that_is_set_is_not_looked_for() -> None:
@@ -118,9 +116,8 @@ def test_a_current_that_is_set_is_not_looked_for() -> None:
     known |= {f"{run}.environment.beta_c": float(b) for run, b in zip(log.runs, beta_c, strict=True)}
     vessel = SHIP.with_values({"current.kind": "uniform"})
     settings = Identify(parameters=FEW, weights=NOISE, horizon=0, start="base", runs=known)
-    assert not estimate_currents(identify(vessel, log, log.runs, settings), log)
-    alone = log.select(log.runs[:1])
-    assert not estimate_currents(fitted(alone), alone)
+    assert identify(vessel, log, log.runs, settings).settings.current == "none"
+    assert fitted(log.select(log.runs[:1])).settings.current == "none"
 
 
 HOW = {"parameters": FEW, "weights": NOISE, "horizon": 0, "start": "base"}
