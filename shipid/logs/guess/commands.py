@@ -390,7 +390,7 @@ def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
         )
         if not all(why for _, why in zeros.values()):
             guesses = " and ".join(f"{zero:g}" for zero, _ in zeros.values())
-            words = f"which value of {both} is a stopped screw? {guesses} is a guess: write offset = -factor * value"
+            words = f"which value of {both} is a stopped screw? Drafted: {guesses}. Write offset = -factor * value"
             state.ask(("n",), words)
     if not by_name:
         state.ask(
