@@ -76,8 +76,9 @@ FIELDS = {
     "second": ("second seconds sec ss s sekunde seconde secondo segundo sekund sek", 0.0, 60.0),
 }
 """Field of a date or time in columns -> words for it, and its least and largest number."""
-FINE = {"ns": 1e8, "us": 1e5}
-"""Unit of a clock -> least step of whole numbers in it: 0.1 s."""
+FINE = {"ns": 1.5e7, "us": 1.5e4}
+"""Unit of a clock -> least step of whole numbers in it: 15 ms, where the next unit says 15 s, and hardly a log has rows so
+rarely."""
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in EPOCHS.items()}
 """Unit of a clock in days -> its numbers of 1990 and 2050. Those of Excel from 2031 and
 modified Julian dates to 2008 are the same numbers."""

@@ -23,6 +23,7 @@ from tests.logs.guess.conftest import TABLE, T, log_of, sniff
         (1.7e9 + 240.5 * T, "s", 1.7e9 + 240.5 * T),
         ((1e3 * (1.7e9 + 240 * T)).astype(np.int64), "ms", 1.7e9 + 240 * T),
         ((1e6 * T).astype(np.int64), "us", T),
+        ((1e6 * (9.0 + T / 4)).astype(np.int64), "us", 9.0 + T / 4),
         ((1e9 * (5.0 + T)).astype(np.int64), "ns", 5.0 + T),
         ((1e6 * (1.7e9 + T)).astype(np.int64), "us", 1.7e9 + T),
         ((1e9 * (1.7e9 + T)).astype(np.int64), "ns", 1.7e9 + T),
