@@ -70,12 +70,18 @@ def replace_whole(target: str | os.PathLike[str]) -> Iterator[Path]:
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it, synced to disk; OSError for one that was there, and has been moved away."""
     if not folder.is_dir():
-        if folder in _KNOWN:
+        if Path(os.path.realpath(folder)) in _KNOWN:
             raise FileNotFoundError(errno.ENOENT, "the folder has gone: it was moved or removed", str(folder))
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
         sync_to_disk(folder.parent)
-    _KNOWN.add(folder)
+    _KNOWN.add(Path(os.path.realpath(folder)))
+
+
+def forget_folder(folder: Path) -> None:
+    """Let a folder that is made anew, where one was moved away, be written to again."""
+    whole = Path(os.path.realpath(folder))
+    _KNOWN.difference_update([one for one in _KNOWN if whole in (one, *one.parents)])
 
 
 def sync_to_disk(place: Path) -> None:

@@ -23,6 +23,7 @@ MOTIONS = {3: "uvr", 4: "uvpr", 6: "uvwpqr"}
 DAMPING = {"X_u|u|": 0.02, "Y_v|v|": 0.6, "N_r|r|": 0.05, "Z_w|w|": 0.5, "K_p|p|": 0.3, "M_q|q|": 0.1}
 SCREWS = ("propeller", "controllable_pitch", "four_quadrant", "quadratic")
 DRIVES = (*SCREWS, "azimuth", "tunnel", "service_speed")
+FORCES = ("force", "swivel_force")
 RUDDERS = ("rudder", "rudder_polynomial", "rudder_coefficients", "rudder_derivatives")
 
 
@@ -100,6 +101,7 @@ def drawn_ship(seed: int, dof: int = 3) -> Vessel:
         document["wind"] = _wind(size, dice)
     if dice.maybe():
         document["current"] = {"kind": "uniform"}
+    document["thruster"] |= _forces(size, Dice(np.random.default_rng([seed, dof, len(FORCES)])))
     return check_document(document, f"drawn-{seed}.toml")
 
 
@@ -223,10 +225,21 @@ def _thrusters(size: Size, dice: Dice) -> dict[str, Any]:
     return result
 
 
+def _forces(size: Size, dice: Dice) -> dict[str, Any]:
+    """Thrusters that are ordered by force, on one ship in five each."""
+    result = {}
+    for kind in filter(lambda _: dice.maybe(0.2), FORCES):
+        at = {"x": -0.3 * size.L, "y": dice(-0.3, 0.3) * size.B, "z": dice(0, 1) * size.T}
+        orders = ("force", "alpha") if kind == "swivel_force" else ("force",)
+        result[kind] = {"kind": kind, **at, "k_T": dice(0.7, 1.1), "k_astern": dice(0.5, 1)}
+        result[kind] |= _gear(size, dice, *orders)
+    return result
+
+
 def _gear(size: Size, dice: Dice, *orders: str) -> dict[str, Any]:
     """Actuators of some orders: lags, rates and stops, or none."""
-    fast = {"n": size.n / 3, "alpha": 0.3, "delta": 0.3, "pitch": 0.5}
-    stops = {"n": size.n, "alpha": 1.5, "delta": 0.5, "pitch": 0.8}
+    fast = {"n": size.n / 3, "force": size.thrust / 3, "alpha": 0.3, "delta": 0.3, "pitch": 0.5}
+    stops = {"n": size.n, "force": size.thrust, "alpha": 1.5, "delta": 0.5, "pitch": 0.8}
     found: dict[str, Any] = {}
     for order in filter(lambda _: dice.maybe(), orders):
         rate = {"rate": fast[order] / size.time * dice(0.3, 3)}
@@ -308,13 +321,15 @@ def extreme_inputs(vessel: Vessel, count: int, seed: int = 0) -> dict[str, dict[
     random, model, sizes = np.random.default_rng(seed), vessel_dynamics(vessel), vessel.document["particulars"]
     U, L = sizes["U_0"], sizes["L_pp"]
     n = U / (0.6 * sizes["T"] * 0.55)
+    thrust = 0.25 * vessel.document["constants"]["rho"] * (0.55 * sizes["T"]) ** 4 * n**2
     ranges: Mapping[str, tuple[float, float, list[float]]] = {  # least, greatest, and what is often taken instead
         **dict.fromkeys(("north", "east"), (-100.0, 100.0, [0.0])), "psi": (-7.0, 7.0, [0.0, np.pi, -np.pi]),
         "down": (-0.1 * sizes["T"], 0.1 * sizes["T"], [0.0]), "phi": (-0.5, 0.5, [0.0]), "theta": (-0.1, 0.1, [0.0]),
         "u": (-0.5 * U, 1.2 * U, [0.0, -0.5 * U, 1e-9]), "v": (-0.7 * U, 0.7 * U, [0.0, U]),
         "w": (-0.1 * U, 0.1 * U, [0.0]), "p": (-0.3, 0.3, [0.0]), "q": (-0.05, 0.05, [0.0]),
         "r": (-U / L, U / L, [0.0]),
-        "n": (-n, 1.3 * n, [0.0, -n]), "alpha": (-4.0, 4.0, [0.0, np.pi]), "delta": (-1.2, 1.2, [0.0]),
+        "n": (-n, 1.3 * n, [0.0, -n]), "force": (-thrust, 1.3 * thrust, [0.0, -thrust]),
+        "alpha": (-4.0, 4.0, [0.0, np.pi]), "delta": (-1.2, 1.2, [0.0]),
         "pitch": (-1.2, 1.4, [0.0]), "V_w": (0.0, 60.0, [0.0, 60.0]), "beta_w": (-4.0, 7.0, [0.0]),
         "V_c": (0.0, 0.5 * U, [0.0]), "beta_c": (-4.0, 7.0, [0.0]),
     }  # fmt: skip

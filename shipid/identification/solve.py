@@ -116,7 +116,8 @@ def _fit_choosing_current(
 ) -> Solution:
     """The fit with the current of the settings, or with that which a diagnosis of the fit without current names.
 
-    Currents by run are judged about a fit with one of all runs: far from it the numbers make up for a part of it.
+    Currents by run are judged about a fit with one of all runs: far from it the numbers make up for a part of it. Where
+    the current is asked for as a nuisance they are the rule, unless the diagnosis names one of all runs.
     """
     wanted = "current" in settings.widths
     if settings.current != "chosen" or (wanted and len(runs) < LEAST_RUNS):
@@ -129,11 +130,13 @@ def _fit_choosing_current(
     if kind is None and not wanted:
         return solution
     own = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
+    by_run = wanted and kind != "one"
+    begin = start if by_run else own  # numbers that the currents of runs have bent are no place to begin
     fits = [solution]
-    for one in ("one", "by run")[kind is None :]:
-        if one == "one" or kind is None or _current_kind(fits[-1], dataset) == one:
+    for one in ("one", "by run")[by_run:]:
+        if one == "one" or by_run or _current_kind(fits[-1], dataset) == one:
             chosen = settings.model_copy(update={"current": one}).with_sizes(typical_errors(vessel, dataset, runs))
-            fits.append(_fit_dropping_factors(vessel, dataset, runs, chosen, own, progress))
+            fits.append(_fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress))
     again = fits[-1]
     if again.status not in ("ok", "stopped") and not wanted:
         failed = f"residuals look like those of a current, but the fit with it fails: {again.sentence}"

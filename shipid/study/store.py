@@ -22,6 +22,7 @@ from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.files import (
     arrays_with_prefix,
+    forget_folder,
     make_folder,
     quote_argument,
     read_arrays,
@@ -142,6 +143,7 @@ def _make(folder: Path, plan: Plan) -> None:
         _write_plan(above / folder.name, plan)
         try:
             os.rename(above / folder.name, folder)
+            forget_folder(folder)
             sync_to_disk(folder.parent)
         except OSError:
             if not (folder / STUDY).exists():

@@ -77,8 +77,7 @@ FIELDS = {
 }
 """Field of a date or time in columns -> words for it, and its least and largest number."""
 FINE = {"ns": 1.5e7, "us": 1.5e4}
-"""Unit of a clock -> least step of whole numbers in it: 15 ms, where the next unit says 15 s, and hardly a log has rows so
-rarely."""
+"""Unit of a clock -> least step of whole numbers in it: 15 ms. In the next unit it is 15 s: no log is so slow."""
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in EPOCHS.items()}
 """Unit of a clock in days -> its numbers of 1990 and 2050. Those of Excel from 2031 and
 modified Julian dates to 2008 are the same numbers."""
