@@ -199,7 +199,7 @@ def blocks(path: str, schema: Schema, seen: Seen, kind: str | None = None) -> li
     """Lines of a block of a document and of the blocks inside it: heading, words, table."""
     defs, text = schema.get("$defs", {}), str(schema.get("description", ""))
     name = f"`[{path}]`" if path else "Top level"
-    content = json.dumps([name, schema.get("properties"), text if kind else ""], sort_keys=True)
+    content = json.dumps([name, schema.get("properties"), kind], sort_keys=True)
     if content in seen:
         return []
     seen.add(content)
