@@ -96,16 +96,16 @@ class AnswerCase:
     def error(self, model: str, amount: int, metric: Literal["H", "H_end"] = "H") -> str:
         """H of a model, or its error at the horizon, with its interval, in words."""
         table = self.table if metric == "H" else self.at_horizon
-        error = float(self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)][metric].iloc[0])
-        known = model in table.H
+        row, known = self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)], model in table.H
+        error = float(row[metric].iloc[0]) if len(row) else table.mean(model, self.ends[amount])
         return length_with_interval(error, *(table.interval(model, self.ends[amount]) if known else (np.nan, np.nan)))
 
-    def without_physics(self, best: str, amount: int, metric: Literal["H", "H_end"] = "H") -> str:
-        """The same error without physics, and whether the test shows that it differs from that of the best model."""
-        error, table = self.error(NO_MODEL, amount, metric), self.table if metric == "H" else self.at_horizon
-        if not {NO_MODEL, best} <= set(table.H) or too_few_manoeuvres(table.runs):
+    def rival(self, name: str, best: str, amount: int, metric: Literal["H", "H_end"] = "H") -> str:
+        """The same error of a rival, and whether the test shows that it differs from that of the best model."""
+        error, table = self.error(name, amount, metric), self.table if metric == "H" else self.at_horizon
+        if not {name, best} <= set(table.H) or too_few_manoeuvres(table.runs):
             return f"{error}, untested"
-        more, less, _ = self.sides([best], table.lead(NO_MODEL, [best], self.ends[amount]))
+        more, less, _ = self.sides([best], table.lead(name, [best], self.ends[amount]))
         return f"{error}, {'shown to be larger' if more else 'shown to be less' if less else 'not shown to differ'}"
 
     def sides(self, models: Sequence[str], differences: Differences) -> list[list[str]]:
@@ -313,7 +313,10 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     if best is None:
         yield f"With {runs}, no model is {BEST}. {_mean_errors(case.results, rows['H_end'])}"
         return
-    without = f" Without physics: {case.without_physics(best, largest, 'H_end')}." if NO_MODEL in rows.index else ""
+    without = f" Without physics: {case.rival(NO_MODEL, best, largest, 'H_end')}." if NO_MODEL in rows.index else ""
+    place, table = case.ends[largest], case.at_horizon
+    if {REGRESSION, best} <= set(table.H) and table.mean(REGRESSION, place) < table.mean(best, place):
+        without += f" A regression without physics errs by less: {case.rival(REGRESSION, best, largest, 'H_end')}."
     yield (
         f"{case.ahead} ahead, {best} ({BEST}) with {runs} errs by {case.error(best, largest, 'H_end')} on average, "
         f"nine in ten below {metres_text(float(rows['H_end_90'][best]))}.{without}"
@@ -328,7 +331,7 @@ def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
         yield (
             f"H is the mean error over all {case.ahead}, not only at their end: {case.error(best, largest)} for {best} "
             f"with {counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
-            + (f" Without physics H is {case.without_physics(best, largest)}." if NO_MODEL in rows.index else "")
+            + (f" Without physics H is {case.rival(NO_MODEL, best, largest)}." if NO_MODEL in rows.index else "")
         )
 
 

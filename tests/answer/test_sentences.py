@@ -15,6 +15,7 @@ from shipid.answer.sentences import _bounds, answer_sentences, best_model, error
 from shipid.report.content import AnswerSentence
 from shipid.report.page import split_answer
 from shipid.report.sections import SECTIONS
+from shipid.study.plan import Batch
 from shipid.study.results import Results
 from tests.answer.byhand import grid
 
@@ -45,6 +46,16 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     assert f"Without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
     assert "With 10 and 60 runs, every compared model beats constant u, v, r (H 10.0 m)." in advice
     assert "With 60 runs, 1 of 2 physics models does better than no physics: good; bad does worse." in advice
+
+
+@pytest.mark.parametrize(("error", "told"), [(0.5, True), (2.0, False)])
+def test_the_headline_says_that_a_regression_errs_by_less(made: Any, error: float, told: bool) -> None:
+    results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}), runs=8)
+    paths = {Batch(amount, 0).key: error / 10 * results.naive[..., None] * [1.0, 0.0] for amount in (10, 30)}
+    headline = text(replace(results, regression=paths)).partition("\n")[0]
+    assert headline.startswith("8 s ahead, good (best in validation) with 30 runs errs by 1.00 m")
+    regressed = re.search(r" A regression without physics errs by less: 0\.50 m \[.*\], shown to be less\.", headline)
+    assert bool(regressed) == told == ("regression" in headline)
 
 
 @pytest.mark.parametrize("runs", [1, 8])
