@@ -252,10 +252,8 @@ class Predictor(DeployedMethod):
         (S,) of `roll_out`, if it is known already. DataError as of `predict`.
         """
         instants = self._known(instants)
-        known, lost = (
-            {**instants.columns, **instants.estimates},
-            self.roll_out(instants)[1] if diverged is None else diverged,
-        )
+        known = {**instants.columns, **instants.estimates}
+        lost = self.roll_out(instants)[1] if diverged is None else diverged
         if self.alarm is None:
             return np.asarray(lost | self.outside(known))
         raised = lost | self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))

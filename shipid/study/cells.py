@@ -259,14 +259,14 @@ def evaluate_mean(
         provenance={**first.provenance, "cell": row["cell"], "foundation": name},
         bands=None,
     )
-    instants, test = (
-        instants_of(prepared.study, first.vessel, prepared.data, windows) for windows in (work.windows, prepared.test)
-    )
+    instants = instants_of(prepared.study, first.vessel, prepared.data, work.windows)
     predictor = with_bands(predictor, mean_errors, work.windows, instants, prepared.kinds)
     paths = sum_paths([part.paths for part in parts if part.paths is not None], weights)
+    test = instants_of(prepared.study, first.vessel, prepared.data, prepared.test)
     words = ", ".join(f"{part} {weight:.2g}" for part, weight in zip(foundation.mean_of, weights, strict=True))
-    said = {"status": "ok", "sentence": "; ".join(notes), "hyperparameters": words}
-    return Cell({**row, **_errors_of_paths(prepared, predictor, test, paths), **said}, predictor, paths)
+    outcome = _errors_of_paths(prepared, predictor, test, paths)
+    outcome |= {"status": "ok", "sentence": "; ".join(notes), "hyperparameters": words}
+    return Cell({**row, **outcome}, predictor, paths)
 
 
 def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
