@@ -67,7 +67,7 @@ class Cause:
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
     repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
-    cost : what its free signs add to the misfit.
+    cost : what its free signs add to the misfit. of_runs : whether each run has a size of its own.
     """
 
     key: str
@@ -82,6 +82,7 @@ class Cause:
     tells: str = ""
     starts: tuple[float, ...] = ()
     cost: float = 0.0
+    of_runs: bool = False
 
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
@@ -304,7 +305,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     if count > 1:
         yield Cause(
             "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
-            repair='--set current="by run"', equals=equals, tells=COURSES,
+            repair='--set current="by run"', equals=equals, tells=COURSES, of_runs=True,
         )  # fmt: skip
     yield Cause(
         "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),

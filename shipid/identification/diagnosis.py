@@ -39,6 +39,7 @@ The causes of least misfit also predict paths of 2.5 ship lengths, whose errors 
 - The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
   the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
   and `equals` are the causes that remain.
+- `current by run` gains only what is beyond an unknown force of each run, as gusts are.
 - A second cause is looked for in the same way once the log is repaired from the first; then each is fitted beside the
   other.
 """
@@ -48,7 +49,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from itertools import pairwise
+from itertools import pairwise, product
 from types import MappingProxyType
 from typing import Any
 
@@ -221,11 +222,12 @@ class _Log:
             begins.append(here)
             blocks.append(number + first)
             first += int(number.max(initial=-1)) + 1
-            runs.append(np.full(len(here), run % FOLDS))
+            runs.append(np.full(len(here), run))
         begin = np.concatenate(begins)
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
         self.block = np.concatenate(blocks)
-        self.fold = np.concatenate(runs) if len(set(self.motion.runs)) >= FOLDS else self.block % FOLDS
+        self.run = np.concatenate(runs)
+        self.fold = (self.run if len(set(self.motion.runs)) >= FOLDS else self.block) % FOLDS
         self.paths = np.concatenate(
             [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
         ).astype(int)
@@ -284,7 +286,7 @@ class _Log:
         """Residuals (6, W): measured change less predicted change, a unit of time."""
         columns, bumps = motion.columns, self.bumps
         forces = self.forces(motion)
-        changes = [columns[name][bumps] @ self.pull for name in ("u", "v", "r", "psi", "north", "east")]
+        changes = [columns[name][bumps] @ self.pull for name in STATES]
         velocity = (columns["u"] + 1j * columns["v"]) * np.exp(1j * columns["psi"])
         path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
         turning = changes[3] - columns["r"][bumps] @ self.phi
@@ -359,6 +361,19 @@ class _Log:
     def misfit(self, z: Array) -> float:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
         return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
+
+    def gain_of_forces(self, z: Array) -> float:
+        """By how much an unknown force of each run, ahead and aside, lowers the misfit of z (6, W) and of paths.
+
+        Gusts are one, and so is what the vessel lacks. It is estimated without the blocks that it is judged on; paths
+        weigh as the two equations do.
+        """
+        left, fold = z.copy(), self.block % FOLDS
+        for run, out in product(set(self.motion.runs), range(FOLDS)):
+            judged, kept = ((self.run == run) & here for here in (fold == out, fold != out))
+            if judged.any() and kept.any():
+                left[:2, judged] -= z[:2, kept].mean(axis=1, keepdims=True)
+        return 2 * max(self.misfit(z) - self.misfit(left), 0.0)
 
     def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
         """By how much one misfit is lower than another, and the standard error over blocks of time.
@@ -562,7 +577,7 @@ def diagnose(
         return first
     motion = log.motion
     log.repair(fit.motion)
-    second, other = _judge(log, [one for one in causes if one.key != fit.cause.key])
+    second, other = _judge(log, [one for one in causes if one.key.partition(" / ")[0] != first.cause])
     if other is not None:
         log.repair(other.cause.change(motion, other.theta))  # each beside the other
         fit = log.estimate(fit.cause)
@@ -578,26 +593,26 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause) for key in near}
-    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
+    forces = log.gain_of_forces(base)
+    cost = {cause.key: cause.cost + forces * cause.of_runs for cause in causes}
+    misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
-    misfits |= {key: fits[key].cause.cost - log.gain(plain, one)[0] for key, one in seen.items()}
+    misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
     best = fits[order[0]]
     cause, theta = best.cause, best.theta
-    gain, error = log.gain(plain, seen[order[0]])
+    gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
     ahead, missed = log.step * AHEAD, float(plain[1].mean())
     share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
     result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
-    shown = (
-        gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
-    )
+    shown = gain > min(SURE * error, DECISIVE) and (share > least or gain > log.plain * log.worth)
     if missed < log.blur or not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
-    behind = {key: log.gain(seen[key], seen[order[0]]) for key in order[1:]}
+    behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order[1:]}
     tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
     near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
     name = cause.key.partition(" / ")[0]
