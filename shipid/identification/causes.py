@@ -172,19 +172,15 @@ def _add_current(run: NDArray[np.intp], motion: Motion, size: Array) -> Motion:
     return motion.put({"V_c": np.abs(current), "beta_c": np.angle(current)})
 
 
-def _add_drift(motion: Motion, size: Array) -> Motion:
-    """Velocities over ground in a current (north, east) [m/s], where they are logged through the water."""
-    body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
-    over = {"u": motion.columns["u"] + body.real, "v": motion.columns["v"] + body.imag}
-    return _add_current(np.zeros(len(body), dtype=np.intp), motion.put(over), size)
+def _add_drift(motion: Motion, size: Array, *, along: bool = False) -> Motion:
+    """Velocities over ground in a current (north, east) [m/s], where they are logged through the water.
 
-
-def _add_drift_along(motion: Motion, size: Array) -> Motion:
-    """Velocities over ground in a current, where a speed through the water was resolved along the course."""
+    along : whether it was a speed, resolved along the course.
+    """
     through = motion.columns["u"] + 1j * motion.columns["v"]
-    course = through / np.maximum(np.abs(through), 1e-9)
     body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
-    over = through + course * (body * course.conj()).real
+    course = through / np.maximum(np.abs(through), 1e-9)
+    over = through + (course * (body * course.conj()).real if along else body)
     return _add_current(np.zeros(len(body), dtype=np.intp), motion.put({"u": over.real, "v": over.imag}), size)
 
 
@@ -312,8 +308,8 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
         repair="u and v are through the water: take [estimate] in their place", tells=COURSES,
     )  # fmt: skip
     yield Cause(
-        "velocity through water / along the course", _add_drift_along, 2 * (trial,), "m/s", least, equals=equals,
-        repair="the speed is one through the water: take [estimate] in its place", tells=COURSES,
+        "velocity through water / along the course", partial(_add_drift, along=True), 2 * (trial,), "m/s", least,
+        repair="the speed is one through the water: take [estimate] in its place", equals=equals, tells=COURSES,
     )  # fmt: skip
     if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
         yield Cause(

@@ -92,7 +92,7 @@ SURE, APART = 2.0, 2.0  # standard errors
 DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
 WORTH = {"sensor": 0.2, "command": 0.25, "coefficient": 0.3}  # share of the error of the path; a poor vessel has some
 WORTH_OTHER, WORTH_DISCRETE = 0.2, 0.05  # of another cause; of one without a size, as a wrong sign
-CHANNELS = ("u", "v", "r", "psi", "along", "across")
+STATES = ("u", "v", "r", "psi", "north", "east")
 
 
 @dataclass(frozen=True)
@@ -246,30 +246,23 @@ class _Log:
     def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
         """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
         share = min(usual / self.step, 1.0) ** 0.5
-
-        def white(name: str) -> float:
-            values = [np.unwrap(rows[name]) if name == "psi" else rows[name] for _, rows in stretches]
-            return float(share * np.median([white_noise_of(np.asarray(one, dtype=float)) for one in values]))
-
-        sizes = {name: float(np.sqrt(np.mean(self.motion.columns[name] ** 2))) for name in ("u", "v", "r")}
-        rough = max(white(name) / max(size, 1e-12) for name, size in sizes.items())
+        series = {name: [np.asarray(rows[name], dtype=float) for _, rows in stretches] for name in STATES}
+        series["psi"] = [np.unwrap(values) for values in series["psi"]]
+        u, v, r, psi, north, east = (share * np.median([*map(white_noise_of, series[name])]) for name in STATES)
+        sizes = (np.sqrt(np.mean(self.motion.columns[name] ** 2)) for name in ("u", "v", "r"))
+        rough = max(noise / max(size, 1e-12) for noise, size in zip((u, v, r), sizes, strict=True))
         self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
         pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
         speed, passing = self.scales.speed, self.scales.passing
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
-        velocity = [pulled * white(name) for name in ("u", "v", "r")]
-        place = pulled * max(white("north"), white("east"))
-        heading = summed * speed * white("psi")
-        fix = max(white("north"), white("east"))
+        heading, fix = summed * speed * psi, max(north, east)
         self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
         ahead = self.step * AHEAD
         way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
-        self.blind = float(
-            np.linalg.norm([2**0.5 * self.blur, *(way * [white(name) for name in ("u", "v", "psi", "r")])])
-        )
-        turning = np.hypot(pulled * white("psi"), summed * white("r"))
-        along, across = (np.hypot(place, summed * white(name)) for name in ("u", "v"))
-        noise = [*velocity, turning, along, np.hypot(across, heading)]
+        self.blind = float(np.linalg.norm([2**0.5 * self.blur, *(way * [u, v, psi, r])]))
+        turning = np.hypot(pulled * psi, summed * r)
+        along, across = (np.hypot(pulled * fix, summed * one) for one in (u, v))
+        noise = [pulled * u, pulled * v, pulled * r, turning, along, np.hypot(across, heading)]
         return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
 
     def states(self, motion: Motion) -> dict[str, Array]:
@@ -434,8 +427,8 @@ class _VesselLog(_Log):
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
         names = ["u", "v", "r", *self.commands, *self.environment]
         names += ["psi"] if any(motion.columns[name].any() for name in self.environment) else []
-        same = self._kept is not None and motion.parameters is self.motion.parameters
-        if self._kept is not None and same and all(motion.columns[name] is self.motion.columns[name] for name in names):
+        same = all(motion.columns[name] is self.motion.columns[name] for name in names)
+        if self._kept is not None and same and motion.parameters is self.motion.parameters:
             return self._kept[1]
         return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
 
