@@ -67,7 +67,7 @@ class Cause:
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
     repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
-    cost : what its free signs add to the misfit.
+    cost : what its free signs add to the misfit. of_runs : whether each run has a size of its own.
     """
 
     key: str
@@ -82,6 +82,7 @@ class Cause:
     tells: str = ""
     starts: tuple[float, ...] = ()
     cost: float = 0.0
+    of_runs: bool = False
 
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
@@ -171,19 +172,15 @@ def _add_current(run: NDArray[np.intp], motion: Motion, size: Array) -> Motion:
     return motion.put({"V_c": np.abs(current), "beta_c": np.angle(current)})
 
 
-def _add_drift(motion: Motion, size: Array) -> Motion:
-    """Velocities over ground in a current (north, east) [m/s], where they are logged through the water."""
-    body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
-    over = {"u": motion.columns["u"] + body.real, "v": motion.columns["v"] + body.imag}
-    return _add_current(np.zeros(len(body), dtype=np.intp), motion.put(over), size)
+def _add_drift(motion: Motion, size: Array, *, along: bool = False) -> Motion:
+    """Velocities over ground in a current (north, east) [m/s], where they are logged through the water.
 
-
-def _add_drift_along(motion: Motion, size: Array) -> Motion:
-    """Velocities over ground in a current, where a speed through the water was resolved along the course."""
+    along : whether it was a speed, resolved along the course.
+    """
     through = motion.columns["u"] + 1j * motion.columns["v"]
-    course = through / np.maximum(np.abs(through), 1e-9)
     body = (size[0] + 1j * size[1]) * np.exp(-1j * motion.columns["psi"])
-    over = through + course * (body * course.conj()).real
+    course = through / np.maximum(np.abs(through), 1e-9)
+    over = through + (course * (body * course.conj()).real if along else body)
     return _add_current(np.zeros(len(body), dtype=np.intp), motion.put({"u": over.real, "v": over.imag}), size)
 
 
@@ -304,15 +301,15 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     if count > 1:
         yield Cause(
             "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
-            repair='--set current="by run"', equals=equals, tells=COURSES,
+            repair='--set current="by run"', equals=equals, tells=COURSES, of_runs=True,
         )  # fmt: skip
     yield Cause(
         "velocity through water", _add_drift, 2 * (trial,), "m/s", least, equals=(*equals, "sensor u bias"),
         repair="u and v are through the water: take [estimate] in their place", tells=COURSES,
     )  # fmt: skip
     yield Cause(
-        "velocity through water / along the course", _add_drift_along, 2 * (trial,), "m/s", least, equals=equals,
-        repair="the speed is one through the water: take [estimate] in its place", tells=COURSES,
+        "velocity through water / along the course", partial(_add_drift, along=True), 2 * (trial,), "m/s", least,
+        repair="the speed is one through the water: take [estimate] in its place", equals=equals, tells=COURSES,
     )  # fmt: skip
     if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
         yield Cause(

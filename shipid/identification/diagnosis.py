@@ -39,6 +39,7 @@ The causes of least misfit also predict paths of 2.5 ship lengths, whose errors 
 - The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
   the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
   and `equals` are the causes that remain.
+- `current by run` gains only what is beyond an unknown force of each run, as gusts are.
 - A second cause is looked for in the same way once the log is repaired from the first; then each is fitted beside the
   other.
 """
@@ -48,7 +49,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from itertools import pairwise
+from itertools import pairwise, product
 from types import MappingProxyType
 from typing import Any
 
@@ -91,7 +92,7 @@ SURE, APART = 2.0, 2.0  # standard errors
 DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
 WORTH = {"sensor": 0.2, "command": 0.25, "coefficient": 0.3}  # share of the error of the path; a poor vessel has some
 WORTH_OTHER, WORTH_DISCRETE = 0.2, 0.05  # of another cause; of one without a size, as a wrong sign
-CHANNELS = ("u", "v", "r", "psi", "along", "across")
+STATES = ("u", "v", "r", "psi", "north", "east")
 
 
 @dataclass(frozen=True)
@@ -221,11 +222,12 @@ class _Log:
             begins.append(here)
             blocks.append(number + first)
             first += int(number.max(initial=-1)) + 1
-            runs.append(np.full(len(here), run % FOLDS))
+            runs.append(np.full(len(here), run))
         begin = np.concatenate(begins)
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
         self.block = np.concatenate(blocks)
-        self.fold = np.concatenate(runs) if len(set(self.motion.runs)) >= FOLDS else self.block % FOLDS
+        self.run = np.concatenate(runs)
+        self.fold = (self.run if len(set(self.motion.runs)) >= FOLDS else self.block) % FOLDS
         self.paths = np.concatenate(
             [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
         ).astype(int)
@@ -244,30 +246,23 @@ class _Log:
     def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
         """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
         share = min(usual / self.step, 1.0) ** 0.5
-
-        def white(name: str) -> float:
-            values = [np.unwrap(rows[name]) if name == "psi" else rows[name] for _, rows in stretches]
-            return float(share * np.median([white_noise_of(np.asarray(one, dtype=float)) for one in values]))
-
-        sizes = {name: float(np.sqrt(np.mean(self.motion.columns[name] ** 2))) for name in ("u", "v", "r")}
-        rough = max(white(name) / max(size, 1e-12) for name, size in sizes.items())
+        series = {name: [np.asarray(rows[name], dtype=float) for _, rows in stretches] for name in STATES}
+        series["psi"] = [np.unwrap(values) for values in series["psi"]]
+        u, v, r, psi, north, east = (share * np.median([*map(white_noise_of, series[name])]) for name in STATES)
+        sizes = (np.sqrt(np.mean(self.motion.columns[name] ** 2)) for name in ("u", "v", "r"))
+        rough = max(noise / max(size, 1e-12) for noise, size in zip((u, v, r), sizes, strict=True))
         self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
         pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
         speed, passing = self.scales.speed, self.scales.passing
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
-        velocity = [pulled * white(name) for name in ("u", "v", "r")]
-        place = pulled * max(white("north"), white("east"))
-        heading = summed * speed * white("psi")
-        fix = max(white("north"), white("east"))
+        heading, fix = summed * speed * psi, max(north, east)
         self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
         ahead = self.step * AHEAD
         way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
-        self.blind = float(
-            np.linalg.norm([2**0.5 * self.blur, *(way * [white(name) for name in ("u", "v", "psi", "r")])])
-        )
-        turning = np.hypot(pulled * white("psi"), summed * white("r"))
-        along, across = (np.hypot(place, summed * white(name)) for name in ("u", "v"))
-        noise = [*velocity, turning, along, np.hypot(across, heading)]
+        self.blind = float(np.linalg.norm([2**0.5 * self.blur, *(way * [u, v, psi, r])]))
+        turning = np.hypot(pulled * psi, summed * r)
+        along, across = (np.hypot(pulled * fix, summed * one) for one in (u, v))
+        noise = [pulled * u, pulled * v, pulled * r, turning, along, np.hypot(across, heading)]
         return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
 
     def states(self, motion: Motion) -> dict[str, Array]:
@@ -284,7 +279,7 @@ class _Log:
         """Residuals (6, W): measured change less predicted change, a unit of time."""
         columns, bumps = motion.columns, self.bumps
         forces = self.forces(motion)
-        changes = [columns[name][bumps] @ self.pull for name in ("u", "v", "r", "psi", "north", "east")]
+        changes = [columns[name][bumps] @ self.pull for name in STATES]
         velocity = (columns["u"] + 1j * columns["v"]) * np.exp(1j * columns["psi"])
         path = (changes[4] + 1j * changes[5] - velocity[bumps] @ self.phi) * self.turn
         turning = changes[3] - columns["r"][bumps] @ self.phi
@@ -360,6 +355,19 @@ class _Log:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
         return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
 
+    def gain_of_forces(self, z: Array) -> float:
+        """By how much an unknown force of each run, ahead and aside, lowers the misfit of z (6, W) and of paths.
+
+        Gusts are one, and so is what the vessel lacks. It is estimated without the blocks that it is judged on; paths
+        weigh as the two equations do.
+        """
+        left, fold = z.copy(), self.block % FOLDS
+        for run, out in product(set(self.motion.runs), range(FOLDS)):
+            judged, kept = ((self.run == run) & here for here in (fold == out, fold != out))
+            if judged.any() and kept.any():
+                left[:2, judged] -= z[:2, kept].mean(axis=1, keepdims=True)
+        return 2 * max(self.misfit(z) - self.misfit(left), 0.0)
+
     def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
         """By how much one misfit is lower than another, and the standard error over blocks of time.
 
@@ -419,8 +427,8 @@ class _VesselLog(_Log):
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
         names = ["u", "v", "r", *self.commands, *self.environment]
         names += ["psi"] if any(motion.columns[name].any() for name in self.environment) else []
-        same = self._kept is not None and motion.parameters is self.motion.parameters
-        if self._kept is not None and same and all(motion.columns[name] is self.motion.columns[name] for name in names):
+        same = all(motion.columns[name] is self.motion.columns[name] for name in names)
+        if self._kept is not None and same and motion.parameters is self.motion.parameters:
             return self._kept[1]
         return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
 
@@ -562,7 +570,7 @@ def diagnose(
         return first
     motion = log.motion
     log.repair(fit.motion)
-    second, other = _judge(log, [one for one in causes if one.key != fit.cause.key])
+    second, other = _judge(log, [one for one in causes if one.key.partition(" / ")[0] != first.cause])
     if other is not None:
         log.repair(other.cause.change(motion, other.theta))  # each beside the other
         fit = log.estimate(fit.cause)
@@ -578,26 +586,26 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause) for key in near}
-    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
+    forces = log.gain_of_forces(base)
+    cost = {cause.key: cause.cost + forces * cause.of_runs for cause in causes}
+    misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
-    misfits |= {key: fits[key].cause.cost - log.gain(plain, one)[0] for key, one in seen.items()}
+    misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
     best = fits[order[0]]
     cause, theta = best.cause, best.theta
-    gain, error = log.gain(plain, seen[order[0]])
+    gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
     ahead, missed = log.step * AHEAD, float(plain[1].mean())
     share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
     result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
-    shown = (
-        gain > min(SURE * error, DECISIVE) and misfits[order[0]] < 0 and (share > least or gain > log.plain * log.worth)
-    )
+    shown = gain > min(SURE * error, DECISIVE) and (share > least or gain > log.plain * log.worth)
     if missed < log.blur or not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
         return result, None
-    behind = {key: log.gain(seen[key], seen[order[0]]) for key in order[1:]}
+    behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order[1:]}
     tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
     near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
     name = cause.key.partition(" / ")[0]

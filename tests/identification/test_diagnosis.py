@@ -82,6 +82,19 @@ def test_coefficients_are_named_as_a_class() -> None:
     assert diagnose(SHIP.with_values(hull), log_of(1)).cause.startswith(("coefficient", UNCLEAR))
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_currents_of_runs_are_told_from_winds(seed: int) -> None:
+    """Neither is logged; a wind of each run was called a current."""
+    random, sea = np.random.default_rng(seed), SHIP.with_values({"current.kind": "uniform"})
+    towards, current, wind = (random.uniform(*ends, 6) for ends in ((-3, 3), (0.1, 0.4), (10, 18)))
+    for weather, cause in (
+        ({"V_c": current, "beta_c": towards}, "current by run"),
+        ({"V_w": wind, "beta_w": towards}, NONE),
+    ):
+        log = noisy(trials(sea, steps=90, seed=seed, weather=weather), NOISE, seed)
+        assert diagnose(SHIP, log).cause == cause
+
+
 def test_a_shaft_without_its_sign_is_named() -> None:
     craft = load_vessel("otter")
     random, log = np.random.default_rng(3), trials(craft, runs=4, steps=200, seed=3, step=0.25)
