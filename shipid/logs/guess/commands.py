@@ -212,7 +212,7 @@ def _ask_about_sides(state: State) -> None:
 
 def _take_unnamed_rudder(state: State, r: Array, used: dict[str, int]) -> None:
     """Suggest the column that turns the ship most as a rudder: one that is held, as orders are, and no screw."""
-    screws = {name for pair in side_pairs(state) if _move_apart(state, pair) for name in pair}
+    screws = {name for pair in side_pairs(state) if _differ_in_motion(state, pair) for name in pair}
     screws |= {name for signal in rows_of_role("command") for name in state.called(signal) if not is_steering(signal)}
     strength = {}
     for name in state.eligible():
@@ -328,7 +328,7 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     speed = np.real(np.gradient(state.position, state.t) * np.exp(-1j * state.psi))
     columns = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and _may_be_actuator(state, name)]
     pairs = [pair for pair in side_pairs(state) if {*pair} <= {*columns}]
-    twins = [pair for pair in pairs if _move_apart(state, pair)]
+    twins = [pair for pair in pairs if _differ_in_motion(state, pair)]
     turn = {name: state.effect(r, state.columns[name]) for name in columns}
     push = {name: state.effect(speed, state.columns[name]) for name in columns}
     sure = [name for name in columns if _says_actuator(state, name)]
@@ -355,7 +355,9 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
         alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
         zero, why = _neutral_value(state, drives)
-        words = f"more of {' and '.join(map(repr, alike))} drives the ship ahead. Of which shaft speed is a value of 1? "
+        words = (
+            f"more of {' and '.join(map(repr, alike))} drives the ship ahead. Of which shaft speed is a value of 1? "
+        )
         words += f"Write factor, and offset = -factor * {zero:g}; in which dead band about it does the screw stop?"
         state.ask(("n",), words)
         extra = {"factor": 1.0} | ({"offset": -zero} if zero else {})
@@ -447,7 +449,7 @@ def side_pairs(state: State) -> list[tuple[str, str]]:
     return [(pair["port"], pair["starboard"]) for pair in sides.values() if len(pair) == 2]
 
 
-def _move_apart(state: State, pair: tuple[str, str]) -> bool:
+def _differ_in_motion(state: State, pair: tuple[str, str]) -> bool:
     """Whether the difference of two columns has a fifth of their range at least: that of twin rudders has less."""
     one, other = (state.columns[name] for name in pair)
     return bool(np.ptp(one - other) > 0.2 * max(np.ptp(one), np.ptp(other)) > 0)
