@@ -336,7 +336,9 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         twins = [
             (one, other) if both[0] > 0 else (other, one)
             for one, other in combinations(sure, 2)
-            for both in [state.effects(r, np.stack([state.columns[one], state.columns[other]]))]
+            for both in [
+                evidence.order_effects(state.t, r, np.stack([state.columns[k] for k in (one, other)]), state.part)
+            ]
             if both[0] * both[1] < 0.0
             and np.abs(both).min() > SETTINGS.seen
             and state.effect(speed, state.columns[one] + state.columns[other]) > SETTINGS.seen / 2

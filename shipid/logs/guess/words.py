@@ -503,12 +503,8 @@ def is_order(name: str) -> bool:
 
 def may_be_measured(name: str) -> str:
     """The name without the words ref and reference where only they say that it is a set point, else nothing."""
-    parts = name_parts(name)
-    left = [part for part in parts if part not in ("ref", "reference")]
-    if not left or not is_order(name):
-        return ""
-    rest = left[1:] if len(left[0]) == 1 else left
-    return "" if ORDERS & {*rest} else " ".join(left)
+    left = " ".join(part for part in name_parts(name) if part not in ("ref", "reference"))
+    return left if is_order(name) and not is_order(left) else ""
 
 
 def is_run(name: str) -> bool:
@@ -527,7 +523,7 @@ def is_magnetic(name: str) -> bool:
 
 def side_in_name(name: str) -> str | None:
     """The side or place in a name, such as `port`; None if there is none."""
-    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name.translate(WIDE)))  # 1/s is no starboard
+    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", _plain_name(name)))  # 1/s is no starboard
     parts = set(name_parts(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:
