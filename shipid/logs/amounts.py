@@ -21,9 +21,9 @@ UNIT_WORDS = {
     "deg/s": r"(deg|°|º|grad|[度도]|град)/(s(ec)?|秒|초|с)|dps|degs?_?p?e?r?_?s(ec)?",
     "deg/min": r"(deg|°|º|grad|[度도]|град)/(min|分|분|мин)|dpm|deg_?p?e?r?_?min",
     "rad/s": r"rad/s(ec)?|rads|rad_?p?e?r?_?s(ec)?",
-    "rpm": r"rpm|1/min|min-1|min\^-1|u/min|r/min|o/min|rev/min|tr/min|omw/min|varv/min|giri/min|rev_?p?e?r?_?min"
+    "rpm": r"rpm|1/min|min-1|min\^-1|u/min|r/min|o/min|revs?/min|tr/min|omw/min|varv/min|giri/min|rev_?p?e?r?_?min"
     r"|об/мин|[转轉転]/分",
-    "rev/s": r"rps|1/s|rev/s|hz|s-1",
+    "rev/s": r"rps|1/s|revs?/s(ec)?|hz|s-1",
     "m": r"m|metres?|meters?|meter",
     "km": r"km",
     "cm": r"cm|centimet(er|re)s?",

@@ -25,15 +25,15 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
     `attrs["other"]` says of other variables what they are, and how to make a vector; `attrs["notes"]` are sentences.
     """
     from scipy.io import loadmat
+    from scipy.io.matlab import matfile_version
 
     try:
+        if matfile_version(file)[0] > 1:  # 2 of version 7.3, which is HDF5
+            message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
+            raise DataError(message, file=file, path="format.kind")
         variables = loadmat(file, simplify_cells=True)
         vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))
-    except NotImplementedError:
-        raise DataError(
-            "a MATLAB file of version 7.3: save it with save(..., '-v7')", file=file, path="format.kind"
-        ) from None
-    except (OSError, MemoryError):  # of the system, whatever is in the file
+    except (DataError, OSError, MemoryError):  # the last of the system, whatever is in the file
         raise
     except Exception as error:  # scipy defines no error class: a damaged file raises any of a dozen
         raise DataError(

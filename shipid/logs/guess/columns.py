@@ -43,6 +43,7 @@ from shipid.physics.signals import rows_of_role
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
+NUMBERED = 0.95  # share of the rows, at least, whose number is the next one: a few may be lost, or a file begin anew
 IN_BURSTS = 0.1  # usual step over mean step of a clock, at most, where no window is without a hole
 
 
@@ -105,9 +106,7 @@ def guess(
     state.sides, state.words, state.other = sniffed.sides, sniffed.words, sniffed.other
     state.units |= {name: "quaternion" for name, parts in sniffed.in_parts.items() if len(parts) == 4}
     state.commands = () if vessel is None else vessel_dynamics(vessel).commands
-    numbering = tuple(
-        name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
-    )
+    numbering = tuple(name for name, values in columns.items() if np.mean(np.diff(values) == 1.0) > NUMBERED)
     state.taken.update(numbering)
     if source.parts:
         _report_run_parts(state, source)
@@ -129,8 +128,8 @@ def guess(
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
     for doubt in sniffed.doubts:
         state.ask(("clock", "t"), doubt)
-    clock = str(sniffed.clock["from"])
-    if sniffed.clock["unit"] != "date" and not (is_clock(clock) or state.numbered):
+    clock = sniffed.clock["from"]
+    if isinstance(clock, str) and sniffed.clock["unit"] != "date" and not (is_clock(clock) or state.numbered):
         state.ask(("clock",), f"no column is called a clock: {clock!r} rises from row to row. Is it the time?")
     choose_commands(state)
     suggest_outputs(state, outputs)

@@ -30,6 +30,7 @@ TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
 FASTEST, GEARED = 200.0, 5.0  # rev/s: no shaft is faster; an engine that is faster usually has a gear
 PULSES = (700.0, 2300.0)  # us: what a servo takes is about 1500, from 1000 to 2000
+NOISE = 0.02  # of the range of an order: less is no motion of it
 SERVO, OFF_SERVO = 1500.0, 100.0  # us: its middle, and how far a stopped screw may be from it
 SHARES = {
     ("per cent", "%", "pct", "percent", "prozent"): 100.0,
@@ -38,7 +39,7 @@ SHARES = {
 }
 """Words for a share of the largest value -> what that value is in it."""
 OF_ACTUATORS = frozenset(
-    "throttle throttles thrust thruster motor motors engine esc pwm power gas servo rcou "
+    "throttle throttles lever levers thrust thruster motor motors engine esc pwm power gas servo rcou "
     "chan channel out us raw".split()
 )
 """Words that say an order of an actuator, and not of which kind."""
@@ -211,7 +212,7 @@ def _ask_about_sides(state: State) -> None:
 
 def _take_unnamed_rudder(state: State, r: Array, used: dict[str, int]) -> None:
     """Suggest the column that turns the ship most as a rudder: one that is held, as orders are, and no screw."""
-    screws = {name for pair in twin_columns(state) for name in pair}
+    screws = {name for pair in side_pairs(state) if _differ_in_motion(state, pair) for name in pair}
     screws |= {name for signal in rows_of_role("command") for name in state.called(signal) if not is_steering(signal)}
     strength = {}
     for name in state.eligible():
@@ -326,7 +327,8 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     """
     speed = np.real(np.gradient(state.position, state.t) * np.exp(-1j * state.psi))
     columns = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and _may_be_actuator(state, name)]
-    twins = [pair for pair in twin_columns(state) if {*pair} <= {*columns}]
+    pairs = [pair for pair in side_pairs(state) if {*pair} <= {*columns}]
+    twins = [pair for pair in pairs if _differ_in_motion(state, pair)]
     turn = {name: state.effect(r, state.columns[name]) for name in columns}
     push = {name: state.effect(speed, state.columns[name]) for name in columns}
     sure = [name for name in columns if _says_actuator(state, name)]
@@ -334,7 +336,9 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         twins = [
             (one, other) if both[0] > 0 else (other, one)
             for one, other in combinations(sure, 2)
-            for both in [state.effects(r, np.stack([state.columns[one], state.columns[other]]))]
+            for both in [
+                evidence.order_effects(state.t, r, np.stack([state.columns[k] for k in (one, other)]), state.part)
+            ]
             if both[0] * both[1] < 0.0
             and np.abs(both).min() > SETTINGS.seen
             and state.effect(speed, state.columns[one] + state.columns[other]) > SETTINGS.seen / 2
@@ -351,12 +355,18 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         steered = True
     drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
     if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
+        alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
         zero, why = _neutral_value(state, drives)
-        words = f"{drives!r} drives the ship ahead. Of which shaft speed is a value of 1? Write factor, and offset"
-        state.ask(("n",), f"{words} = -factor * {zero:g}; in which dead band about it does the screw stop?")
+        words = (
+            f"more of {' and '.join(map(repr, alike))} drives the ship ahead. Of which shaft speed is a value of 1? "
+        )
+        words += f"Write factor, and offset = -factor * {zero:g}; in which dead band about it does the screw stop?"
+        state.ask(("n",), words)
         extra = {"factor": 1.0} | ({"offset": -zero} if zero else {})
         why = f"it drives the ship ahead (t value {push[drives]:.0f}){why}"
-        state.suggest(_command_of_column(state, drives, "propeller.n", used), drives, "rpm", 0.5, why, **extra)
+        for name in alike:
+            usual = f"{state.side_of(name) or SIGNALS['n'].component}.n"
+            state.suggest(_command_of_column(state, name, usual, used), name, "rpm", 0.5, why, **extra)
     return steered
 
 
@@ -408,13 +418,15 @@ def _take_twins(state: State, pair: tuple[str, str], effect: float) -> None:
 
 
 def _neutral_value(state: State, name: str) -> tuple[float, str]:
-    """The value of a column at which the ship is at rest, else the middle of pulses, else 0; and why."""
+    """The value of a stopped screw, and why: 0 in numbers of both signs, else that of a ship at rest, else 1500 us."""
     values = state.columns[name]
+    if values.min() < -NOISE * np.ptp(values):
+        return 0.0, "; astern is negative"
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     speed = np.abs(state.chosen.change(state.position)) / span
     still = values[state.chosen.first[speed < 0.05 * np.quantile(speed, 0.9)]]
     usual = float(np.median(still)) if len(still) >= 5 else 0.0
-    if len(still) >= 5 and float(np.median(np.abs(still - usual))) < 0.02 * float(np.ptp(values)):
+    if len(still) >= 5 and float(np.median(np.abs(still - usual))) < NOISE * float(np.ptp(values)):
         other = _are_pulses(values) and abs(usual - SERVO) > OFF_SERVO  # the ship may stop for a moment as it turns
         return usual, "" if other else f"; {usual:g} while the ship is at rest"
     return (SERVO, f"; {SERVO:g} is the middle of a servo") if _are_pulses(values) else (0.0, "")
@@ -426,8 +438,8 @@ def _are_pulses(values: Array) -> bool:
     return bool(len(running) and PULSES[0] < running.min() and running.max() < PULSES[1] and np.ptp(running) > 20)
 
 
-def twin_columns(state: State) -> list[tuple[str, str]]:
-    """The pairs of free columns, port and starboard, whose names are equal but for the side, and that move apart."""
+def side_pairs(state: State) -> list[tuple[str, str]]:
+    """The pairs of free columns, port and starboard, whose names are equal but for the side."""
     sides: dict[tuple[str, ...], dict[str, str]] = {}
     for name in state.free():
         side = state.side_of(name)
@@ -436,13 +448,13 @@ def twin_columns(state: State) -> list[tuple[str, str]]:
                 part for part in name_parts(name) if state.side_of(f"x {part}") != side and part not in ("l", "r")
             )
             sides.setdefault(key, {}).setdefault(side, name)
-    pairs = [(pair["port"], pair["starboard"]) for pair in sides.values() if len(pair) == 2]
-    columns = state.columns
-    return [
-        pair
-        for pair in pairs
-        if np.ptp(columns[pair[0]] - columns[pair[1]]) > 0.2 * max(np.ptp(columns[name]) for name in pair) > 0
-    ]
+    return [(pair["port"], pair["starboard"]) for pair in sides.values() if len(pair) == 2]
+
+
+def _differ_in_motion(state: State, pair: tuple[str, str]) -> bool:
+    """Whether the difference of two columns has a fifth of their range at least: that of twin rudders has less."""
+    one, other = (state.columns[name] for name in pair)
+    return bool(np.ptp(one - other) > 0.2 * max(np.ptp(one), np.ptp(other)) > 0)
 
 
 def _says_actuator(state: State, name: str) -> bool:

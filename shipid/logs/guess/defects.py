@@ -17,7 +17,7 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.sniff import LogTable
-from shipid.logs.mapping import to_si
+from shipid.logs.mapping import source_columns, to_si
 
 POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
@@ -66,7 +66,7 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
     if holes:
         state.find(
             "holes in time",
-            (sniffed.clock["from"],),
+            source_columns(sniffed.clock["from"]),
             0.99,
             f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s",
         )

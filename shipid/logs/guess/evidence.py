@@ -134,50 +134,34 @@ def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> flo
 
 
 def order_effects(t: Array, r: Array, orders: Array, duration: float = 4.0) -> Array:
-    """The t values (K,) of the effects of several orders (K, N) at once, as of `order_effect`."""
-    count = len(orders)
-    rows, design, change = yaw_regression(t, r, orders, duration)
-    if len(rows) < 12 or np.any(np.ptp(orders, axis=1) == 0.0):
-        return np.zeros(count)
-    solution, errors, _ = solve_least_squares(design, change)
-    seen = (errors > 0.0) & np.isfinite(errors)
-    return np.where(seen, solution / np.where(seen, errors, 1.0), 0.0)[:count]
+    """The t values (K,) of the effects of several orders (K, N) at once, as of `order_effect`; 0 where none is seen."""
+    design, change = _yaw_regression(t, r, orders, duration)
+    sizes, none = np.linalg.norm(design, axis=0), np.zeros(len(orders))
+    if len(change) < 12 or np.any(np.ptp(orders, axis=1) == 0.0) or not np.all(sizes > 0.0):
+        return none
+    solution, _, rank, _ = np.linalg.lstsq(design / sizes, change, rcond=None)
+    if rank < len(sizes):
+        return none
+    rest = change - design / sizes @ solution
+    spread = np.sum(np.linalg.pinv(design / sizes) ** 2, axis=1) * (rest @ rest) / max(1, len(rest) - len(sizes))
+    return np.divide(solution, np.sqrt(spread), out=np.zeros(len(sizes)), where=spread > 0.0)[: len(orders)]
 
 
-def yaw_regression(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
-    """First rows (W,), columns (W, K + 2), left side (W,) of r' = a order + b r + c over windows without jumps of r.
-
-    order : (N,), or several (K, N).
-    """
+def _yaw_regression(t: Array, r: Array, orders: Array, duration: float) -> tuple[Array, Array]:
+    """Columns (W, K + 2), left side (W,) of r' = a orders + b r + c over windows without jumps of r; orders (K, N)."""
     chosen = row_windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = RowWindows(chosen.first[::thin], chosen.last[::thin])
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
-    orders = [cumulative_integral(t, one) for one in np.atleast_2d(order)]
-    signals, stretch = (*orders, cumulative_integral(t, r), t, r), _stretch_numbers(t)
-    smooth = [_moving_mean(x, width, stretch) for x in signals]
+    signals = *(cumulative_integral(t, one) for one in (*orders, r)), t, r
+    smooth = [_moving_mean(x, width, _stretch_numbers(t)) for x in signals]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
     design = np.stack(columns, axis=1)
     wild = np.zeros(len(change), dtype=bool)
     for one in (change, design[:, -2]) if len(change) else ():
         wild |= np.abs(one) > WILD * np.percentile(np.abs(one), 95)
     tame = ~wild | (np.sum(wild) > RARE * len(wild))
-    return chosen.first[tame], design[tame], change[tame]
-
-
-def solve_least_squares(design: Array, change: Array) -> tuple[Array, Array, float]:
-    """The solution (K,) by least squares, its standard errors, and the sum of squares left, inf if none is."""
-    sizes = np.linalg.norm(design, axis=0)
-    none = np.zeros(len(sizes)), np.full(len(sizes), np.inf), np.inf
-    if not np.all(sizes > 0):
-        return none
-    solution, _, rank, _ = np.linalg.lstsq(design / sizes, change, rcond=None)
-    if rank < design.shape[1]:
-        return none
-    rest = change - design / sizes @ solution
-    left = float(rest @ rest)
-    spread = np.sum(np.linalg.pinv(design / sizes) ** 2, axis=1) * left / max(1, len(rest) - len(sizes))
-    return solution / sizes, np.sqrt(spread) / sizes, left
+    return design[tame], change[tame]
 
 
 def order_correlation(t: Array, r: Array, order: Array, duration: float) -> float:

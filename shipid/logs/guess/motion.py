@@ -86,11 +86,15 @@ def _take_pose(state: State, best: MotionReading) -> None:
         sentence = f"{int(false.sum())} steps of {pose.heading!r} lie between two headings across {across}"
         repair = {"kind": "wrap_interpolation", "columns": ["psi"], "threshold": 20.0, "unit": "deg"}
         state.find("interpolation across 360", (pose.heading,), 0.98, sentence, repair)
-    extra: dict[str, Any] = {"wrap": True} | ({"sign": -1} if sense.sign < 0 else {})
-    if sense.quarter:
-        extra["offset"] = 90.0 * sense.quarter if pose.unit == "deg" else round(np.pi / 2 * sense.quarter, 9)
-    state.suggest("psi", pose.heading, pose.unit, sure, f"{why}; in {pose.unit} rather than another unit", **extra)
+    why = f"{why}; in {pose.unit} rather than another unit"
+    state.suggest("psi", pose.heading, pose.unit, sure, why, **_keys_of_sense(sense, pose.unit))
     state.psi = sense.direction(angle * to_si(pose.unit, "psi"))
+
+
+def _keys_of_sense(sense: Sense, unit: str) -> dict[str, Any]:
+    """Keys of a column in `unit` that counts in this sense."""
+    zero = {"offset": round(sense.quarter * np.pi / 2 / to_si(unit, "psi"), 9)} if sense.quarter else {}
+    return {"wrap": True} | ({"sign": -1} if sense.sign < 0 else {}) | zero
 
 
 def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], sense: Sense) -> None:
@@ -202,12 +206,8 @@ def _take_velocities(state: State, best: MotionReading, found: Velocity) -> None
         why = f"along the course [{turned}] it {leaves}"
         if found.turn in TURNS:
             set_scale(state, second, 360.0 / found.turn, f"a whole turn is {found.turn:g}: {TURNS[found.turn]}")
-        sense = axes.sense(found.sense)
-        extra: dict[str, Any] = {"wrap": True} | ({"sign": -1} if sense.sign < 0 else {})
-        if sense.quarter:
-            extra["offset"] = round(sense.quarter * np.pi / 2 / to_si(turned, "psi"), 9)
         state.suggest("speed", first, unit, 0.9, why)
-        state.suggest("course", second, turned, 0.9, why, **extra)
+        state.suggest("course", second, turned, 0.9, why, **_keys_of_sense(axes.sense(found.sense), turned))
     else:
         why = f"integrated as {found.kind}-fixed [{unit}] it {leaves}"
         if found.named < 0.45 and not state.numbered:

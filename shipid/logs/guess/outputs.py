@@ -42,10 +42,12 @@ def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
         unit, top = unit_in_name(name, row.unit), float(np.abs(state.columns[name]).max())
         if unit is None:
             state.ask((signal,), f"in which unit is {name!r}, up to {top:.4g}? {row.unit} is a guess")
-        sure, why = 0.8 if unit else 0.4, f"by its name; up to {top:.4g}"
+        sure, why, extra = 0.8 if unit else 0.4, f"by its name; up to {top:.4g}", {}
         if signal == "thrust" and not any(map(is_shaft, commands)):
-            state.ask(
-                ("force", "thrust"), f"is {name!r} the thrust that is ordered, or what is measured? Order is a guess"
-            )
+            words = f"is {name!r} the thrust that is ordered, or what is measured? Order is a guess"
             signal, sure, why = "force", min(sure, 0.5), f"{why}; there is no other order of this screw"
-        state.suggest(unique_name(f"{component}.{signal}", used), name, unit or row.unit, sure, why)
+            if state.commands and "force" not in map(signal_of, state.commands):
+                words += f"; the vessel takes a shaft speed: write a curve of pairs ({unit or row.unit}, rpm)"
+                signal, unit, extra = "n", "rpm", {"factor": 1.0}
+            state.ask((signal, "thrust"), words)
+        state.suggest(unique_name(f"{component}.{signal}", used), name, unit or row.unit, sure, why, **extra)

@@ -240,8 +240,9 @@ def _pose_beyond_names(state: State, named: list[Pose], places: list[Place], hea
     free = [name for name in state.eligible(*meanings) if len(np.unique(state.columns[name][:2000])) > 10]
     free = free[:MOST_COLUMNS]
     cost = -float(np.log(SETTINGS.unnamed))
-    globe = [(a, b) for a, b in permutations(free, 2) if _may_be_globe(state, a, b)]
-    plane = [pair for pair in combinations(free, 2) if not {pair, pair[::-1]} & {*globe}]
+    lengths = [name for name in free if state.units.get(name) != "quaternion"]
+    globe = [(a, b) for a, b in permutations(lengths, 2) if _may_be_globe(state, a, b)]
+    plane = [pair for pair in combinations(lengths, 2) if not {pair, pair[::-1]} & {*globe}]
     wide = [Place(a, b, False, cost) for a, b in plane] + [Place(a, b, True, cost) for a, b in globe]
     courses = _logged_courses(state, "") if headings else []  # which fit a track better than any heading
     ways = [name for name in dict.fromkeys([*headings, *free]) if name not in courses]

@@ -10,7 +10,7 @@ import re
 import unicodedata
 from functools import cache
 
-from shipid.logs.amounts import UNIT_WORDS
+from shipid.logs.amounts import UNIT_WORDS, is_known
 from shipid.physics.signals import SIGNALS
 
 PHRASES: dict[str, str] = {
@@ -355,6 +355,9 @@ _OF_SHAFT = re.compile(rf"k?({UNIT_WORDS['rpm']})|rps|rev/s")
 """Units of a shaft speed, in lower case, that no other quantity has."""
 _EDGE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])")
 _AFTER = re.compile(r"(?:\s+/\s*|,\s*)([^\s,]{1,9})\s*$")
+_SPELT = re.compile(
+    r"(?:[_ ]|(?<=[a-z]))(?:([A-Za-z][a-z]*)[_ ]?[Pp]er[_ ]?([A-Za-z][a-z]*)|(?<=[_ ])newtons?)(?![a-z])"
+)
 NO_VALUE = re.compile(
     r"[-–—*.?_/# ]*|#?n[/.]?a\.?|null|none|nil|-?nan(\(ind\))?|[+-]?inf(inity)?|-?1\.#(ind|q?nan|inf)\d*|no ?data|"
     r"missing"
@@ -364,9 +367,20 @@ LONGEST_WORD = 80  # letters: a longer one is not cut
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
 
 
+@cache
+def _plain_name(name: str) -> str:
+    """A name with the signs of others, and a unit that is spelt out in brackets: `prop_rev_per_s` is `prop [rev/s]`."""
+
+    def in_brackets(found: re.Match[str]) -> str:
+        unit = f"{found[1]}/{found[2]}" if found[1] else "N"
+        return f" [{unit}] " if is_known(unit) else found[0]
+
+    return _SPELT.sub(in_brackets, name.translate(WIDE))
+
+
 def name_parts(name: str) -> tuple[str, ...]:
     """The parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
-    name = name.translate(WIDE)
+    name = _plain_name(name)
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))
     if not bare.isascii():
         bare = _translation_table()[0].sub(_translate, unicodedata.normalize("NFKC", bare))
@@ -411,14 +425,14 @@ def _spell_letter(text: str, place: int) -> str:
 
 def units_in_name(name: str) -> list[str]:
     """What a name has in brackets, after a blank and a slash as in `Schub / kN`, or after a comma."""
-    name = name.translate(WIDE)
+    name = _plain_name(name)
     after = _AFTER.search(name)
     return [*re.findall(r"[\[(]([^\])]*)[\])]", name), *([after.group(1).strip()] if after else [])]
 
 
 def shaft_unit(name: str) -> str:
     """The unit of a shaft speed that a name has, set off or as its last word; empty where it has none."""
-    said = units_in_name(name) or re.split(r"[_ ]", name.translate(WIDE).strip())[-1:]
+    said = units_in_name(name) or re.split(r"[_ ]", _plain_name(name).strip())[-1:]
     return next((unit for unit in said if _OF_SHAFT.fullmatch(unit.strip().lower())), "")
 
 
@@ -489,12 +503,8 @@ def is_order(name: str) -> bool:
 
 def may_be_measured(name: str) -> str:
     """The name without the words ref and reference where only they say that it is a set point, else nothing."""
-    parts = name_parts(name)
-    left = [part for part in parts if part not in ("ref", "reference")]
-    if not left or not is_order(name):
-        return ""
-    rest = left[1:] if len(left[0]) == 1 else left
-    return "" if ORDERS & {*rest} else " ".join(left)
+    left = " ".join(part for part in name_parts(name) if part not in ("ref", "reference"))
+    return left if is_order(name) and not is_order(left) else ""
 
 
 def is_run(name: str) -> bool:
@@ -513,7 +523,7 @@ def is_magnetic(name: str) -> bool:
 
 def side_in_name(name: str) -> str | None:
     """The side or place in a name, such as `port`; None if there is none."""
-    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name.translate(WIDE)))  # 1/s is no starboard
+    bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", _plain_name(name)))  # 1/s is no starboard
     parts = set(name_parts(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:

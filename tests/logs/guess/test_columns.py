@@ -183,3 +183,23 @@ def test_a_shaft_without_a_unit_among_radians_may_count_radians(tmp_path: Path) 
     assert any("rev/s, or rad/s" in question.sentence for question in proposal.questions)
     degrees = guess_of(tmp_path, log.assign(psi=np.degrees(log["psi"])))
     assert not any("rad/s" in question.sentence for question in degrees.questions)
+
+
+def test_numbers_of_rows_are_no_quantity_though_some_are_lost(tmp_path: Path) -> None:
+    """A robot counts its messages: some do not arrive, and a new recording begins anew."""
+    log = as_bridge(si_log(0, 5)).round(4)
+    count = np.arange(len(log)) + 77 * (np.arange(len(log)) > 500)
+    count[-300:] = np.arange(300)
+    found = guess_of(tmp_path, log.assign(seq=count, odd=3 * count))
+    assert found.unused["seq"] == "it holds the numbers of the rows"
+    assert found.unused["odd"] != found.unused["seq"]
+
+
+def test_a_clock_of_two_columns_is_said_by_their_names(tmp_path: Path) -> None:
+    log = as_bridge(si_log(0, 5)).round(4).drop(index=range(800, 900))
+    seconds = 1_700_000_000.0 + log.pop("time").to_numpy()
+    whole = np.floor(seconds)
+    found = guess_of(tmp_path, log.assign(secs=whole, nsecs=np.round(1e9 * (seconds - whole))))
+    (hole,) = (one for one in found.findings if one.kind == "holes in time")
+    assert hole.columns == ("secs", "nsecs")
+    assert not [one for one in found.questions if "clock" in one.about]

@@ -69,3 +69,14 @@ def test_an_output_belongs_to_the_only_shaft() -> None:
 
 def test_a_constant_column_is_no_measurement() -> None:
     assert told(**{"thrust [N]": 0 * FORCE}) == {}
+
+
+@pytest.mark.parametrize(("command", "asked"), [("propeller.n", True), ("propeller.force", False)])
+def test_a_thrust_is_the_order_that_the_vessel_takes(command: str, asked: bool) -> None:
+    """Before, a vessel that takes a shaft speed had no order of its screw, and no question named the column."""
+    state = state_with_pose({"thrust [N]": FORCE})
+    state.commands = (command,)
+    suggest_outputs(state, reserve_outputs(state))
+    assert [(one.name, one.source) for one in state.suggestions] == [(command, "thrust [N]")]
+    (question,) = state.questions
+    assert ("curve of pairs (N, rpm)" in question.sentence) == asked

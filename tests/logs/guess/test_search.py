@@ -239,3 +239,13 @@ def test_a_course_is_no_heading_beside_a_column_named_as_one(share: float) -> No
     words = {"ground_course": course, "ground_speed": np.abs(ground), "AHR2.Yaw": DEG % 360.0, "RATE.Y": rate}
     drafted = {one.name: one.source for one in chosen({**place, **words}).suggestions}
     assert (drafted["psi"], drafted["course"], drafted["r"]) == ("AHR2.Yaw", "ground_course", "RATE.Y")
+
+
+def test_the_yaw_of_a_quaternion_is_no_place() -> None:
+    """Its draft would be refused; a pair of other columns without names is."""
+    columns = {"N": np.cos(T / 11), "E": np.sin(T / 7), "heading": DEG, "A": NORTH, "B": EAST}
+    assert {"A", "B"} <= {*sources(chosen(columns)).values()}
+    state = state_of(columns, T)
+    state.units["B"] = "quaternion"
+    choose_motion(state, FILE)
+    assert not {"north", "east", "latitude", "longitude"} & {one.name for one in state.suggestions if one.source == "B"}

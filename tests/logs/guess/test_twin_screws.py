@@ -28,12 +28,16 @@ SCALES = ((50.0, 50.0), (0.0, 100.0), (1500.0, 500.0), (0.0, 1.0))  # value of a
 
 
 @cache
-def craft(seed: int) -> pd.DataFrame:
-    """A log of the Otter, SI units: at rest, then orders of both screws that change every 6 to 20 s."""
+def craft(seed: int, twin: bool = True) -> pd.DataFrame:
+    """A log of the Otter, SI units: at rest, then orders of both screws that change every 6 to 20 s.
+
+    twin : whether these differ; else they are one, full astern each other time, from a start under way.
+    """
     random = np.random.default_rng(seed)
-    share = [np.zeros((150, 2))]
-    for _ in range(30):
+    share = [np.zeros((150, 2))] if twin else []
+    for number in range(30):
         mean, apart = random.uniform(0.2, 0.7), random.uniform(-0.25, 0.25)
+        mean, apart = (mean, apart) if twin else ((0.9, -0.6)[number % 2], 0.0)
         share.append(np.tile([mean + apart, mean - apart], (int(random.uniform(30, 100)), 1)))
     orders = np.concatenate(share)
     top = 15.0  # rev/s
@@ -74,6 +78,19 @@ def test_each_side_has_its_screw_with_the_value_of_a_stopped_one(seed: int) -> N
     assert [one.extra.get("offset", 0.0) for one in found.values()] == pytest.approx([-still, -still])
     assert "Of which shaft speed" in state.questions[0].sentence
     assert not state.findings
+
+
+@pytest.mark.parametrize("seed", seeds(2, 3))
+@pytest.mark.parametrize("names", [NAMES[1], NAMES[4], ("throttle_babord_pct", "throttle_styrbord_pct")])
+def test_levers_that_move_as_one_are_two_screws_that_stop_at_zero(seed: int, names: tuple[str, str]) -> None:
+    """A ship that goes from ahead to astern is at rest for a moment while its screws run astern."""
+    log = craft(seed, twin=False)
+    columns = {name: 100.0 * log["port"].to_numpy() for name in names}
+    state = guessed(log, columns)
+    found = {one.name: (one.source, one.extra.get("offset", 0.0)) for one in state.suggestions}
+    assert found == {"port.n": (names[0], 0.0), "starboard.n": (names[1], 0.0)}
+    (question,) = state.questions
+    assert all(repr(name) in question.sentence for name in names)
 
 
 @pytest.mark.parametrize("names", [("rpm_port", "rpm_starboard"), ("A port", "A starboard")])

@@ -202,3 +202,24 @@ def test_units_that_are_set_off(name: str, units: list[str]) -> None:
 def test_a_name_says_a_magnetic_compass(name: str, magnetic: bool) -> None:
     """In brackets, too: a magnetic heading was taken beside a true one, for a current made it keep to the track."""
     assert is_magnetic(name) == magnetic
+
+
+@pytest.mark.parametrize(
+    ("spelt", "plain"),
+    [
+        ("prop_rev_per_s_port", "prop_port [rev/s]"),
+        ("yawRateDegPerSec", "yawRate [Deg/Sec]"),
+        ("shaft revs per min", "shaft [revs/min]"),
+        ("surge_m_per_s", "surge [m/s]"),
+        ("thrust_newton_left", "thrust_left [N]"),
+    ],
+)
+def test_a_unit_that_is_spelt_out_is_that_in_brackets(spelt: str, plain: str) -> None:
+    assert name_parts(spelt) == name_parts(plain)
+    assert units_in_name(spelt) == units_in_name(plain)
+
+
+@pytest.mark.parametrize("name", ["temperature_s", "propeller_speed", "upper_deck", "newton", "giri_per_elica"])
+def test_other_words_with_per_are_kept(name: str) -> None:
+    assert units_in_name(name) == []
+    assert "".join(name_parts(name)) == name.replace("_", "")
