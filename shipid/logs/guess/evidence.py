@@ -144,7 +144,7 @@ def order_effects(t: Array, r: Array, orders: Array, duration: float = 4.0) -> A
         return none
     rest = change - design / sizes @ solution
     spread = np.sum(np.linalg.pinv(design / sizes) ** 2, axis=1) * (rest @ rest) / max(1, len(rest) - len(sizes))
-    return np.divide(solution, np.sqrt(spread), out=np.zeros(len(sizes)), where=spread > 0.0)[: len(orders)]
+    return np.asarray(np.divide(solution, np.sqrt(spread), out=np.zeros(len(sizes)), where=spread > 0.0)[: len(orders)])
 
 
 def _yaw_regression(t: Array, r: Array, orders: Array, duration: float) -> tuple[Array, Array]:
