@@ -41,8 +41,8 @@ STILL_ROWS, STILL_RATIO, SHORT_REPEAT_SHARE = (
 )  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
 TURN_TO_BOTH_SIDES = np.radians(
     20.0
-)  # by which the ship turns meanwhile, to each side: to one she turns by a held helm, too
-TURN_OF_ROWS = np.radians(5.0)  # by which she turns in `STILL_ROWS` rows of another turn
+)  # by which the ship turns meanwhile, to each side: to one it turns by a held helm, too
+TURN_OF_ROWS = np.radians(5.0)  # by which it turns in `STILL_ROWS` rows of another turn
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def spiral_measures(record: Record) -> Measures:
         `loop_width` [rad], their difference; `loop_height` [rad/s], the difference of the rates at helm 0. Their
         resolution is `levels_apart` [rad], the distance of the steady levels between which the rate changes sign, the
         larger of both ways. Width and height are 0 for a stable ship, as is a loop below a hundredth of that distance.
-        `helm_levels`, `levels_not_steady`: counts. A ship that turns to one side at every helm angle has no height: her
+        `helm_levels`, `levels_not_steady`: counts. A ship that turns to one side at every helm angle has no height: its
         loop may be wider than the spiral.
     """
     measures, points = Measures(), helm_levels(record)

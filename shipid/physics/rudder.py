@@ -203,7 +203,7 @@ def rudder_coefficients(
 def coefficients_normal_force(nu_r: SX, delta: SX, wash: SX, **numbers: Any) -> SX:
     """Force [N] of `rudder_coefficients` across the blade, > 0 turns the ship to starboard.
 
-    The coefficients are of the ship with her rudder: the share that the rudder induces on the hull is in it.
+    The coefficients are of the ship with its rudder: the share that the rudder induces on the hull is in it.
     """
     force = rudder_coefficients(nu_r, delta, wash, **numbers)
     return -ca.sin(delta) * force[0] - ca.cos(delta) * force[1]

@@ -29,7 +29,7 @@ NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
 SETTLED = 1e-3  # m/s, rad/s: greatest change of a velocity over the last chunk, and greatest yaw rate
-SLOW = 0.02  # s: the same in U^2 / L, for a large and slow ship: her speed is then right to about 1 %
+SLOW = 0.02  # s: the same in U^2 / L, for a large and slow ship: its speed is then right to about 1 %
 STRAIGHT = 0.02  # rad in a ship length: a large and slow ship that turns less goes straight
 CREEPING, AT_REST = 0.02, 1e-4  # Froude numbers: a ship below the second, or astern, is taken for one of the first
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
@@ -116,13 +116,13 @@ class Controls:
 
     @cached_property
     def _turning(self) -> Mapping[str, float]:
-        """Angle command -> sign that turns the ship to starboard, about her service speed.
+        """Angle command -> sign that turns the ship to starboard, about its service speed.
 
         At another ratio of speed and shaft speed the polynomials of a screw, or a hull about that speed, may not hold.
         """
         speed = vessel_service_speed(self.vessel)
         n = balanced_shaft(self, speed)
-        if n is None:  # nothing drives her so fast, or nothing holds her back
+        if n is None:  # nothing drives it so fast, or nothing holds it back
             n = PROBE_SHAFT
             speed = min(_balanced_speed(self.vessel, self.ahead(n)), speed)
         running = self.ahead(n)
@@ -197,7 +197,7 @@ def steady_approach(
 
     Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (large and slow ships: by
     0.02 s U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
-    With the helm amidships she goes straight if she turns by less than 0.001 rad/s, and 0.02 rad in a ship length.
+    With the helm amidships it goes straight if it turns by less than 0.001 rad/s, and 0.02 rad in a ship length.
 
     ShipidError where it diverges; `NotStraight` where it is not steady after an hour or 200 ship lengths, or turns.
     """

@@ -427,19 +427,19 @@ class CrashStop(TimedManoeuvre, Trial):
     angles: ClassVar[tuple[str, ...]] = ()
     straight: ClassVar[bool] = True
     first: ClassVar[tuple[str, ...]] = ("track reach", "head reach", "stopping time")
-    ends: ClassVar[str] = "stopping time"  # when she no longer moves ahead; the log goes on astern
+    ends: ClassVar[str] = "stopping time"  # when it no longer moves ahead; the log goes on astern
     astern_rpm: Annotated[
         Positive,
         Field(description="rpm ordered astern; with a controllable pitch rpm of the shaft while the pitch is astern"),
     ]
 
     def check(self, controls: Controls) -> None:
-        """Raise DocumentError for a vessel whose thrust is known about her service speed alone."""
+        """Raise DocumentError for a vessel whose thrust is known about its service speed alone."""
         super().check(controls)
         vessel = controls.vessel
         about = next((path for path, key, _ in term_blocks(vessel.document) if key == "thruster.service_speed"), None)
         if about is not None:
-            message = f"{vessel.name} cannot stop: her thrust (kind service_speed) holds near her service speed alone"
+            message = f"{vessel.name} cannot stop: its thrust (kind service_speed) holds near its service speed alone"
             raise DocumentError(f"{message}, take a vessel with a propeller", file=vessel.file, path=about)
 
     @property

@@ -168,7 +168,7 @@ def _perform_batch(
     if path.diverged.any():
         worst = list(named)[int(np.argmax(path.diverged[0]))]
         raise ShipidError(
-            f"{vessel.name} diverges in {worst}: take a smaller step than {how['step']:g} s, or mend what drives her"
+            f"{vessel.name} diverges in {worst}: take a smaller step than {how['step']:g} s, or mend what drives it"
         )
     moments = np.arange(rows) * every
     felt = {name: values[np.minimum(moments, len(values) - 1)] for name, values in weather.items()}

@@ -19,7 +19,7 @@ DECAYS, LONGEST = 8.0, 200.0  # until a turn is steady: time constants of a smal
 class Request:
     """Angles, side and times of a standard manoeuvre.
 
-    controls, n, speed : the ship with her commands, shaft speed [rev/s] and speed [m/s] of the approach.
+    controls, n, speed : the ship with its commands, shaft speed [rev/s] and speed [m/s] of the approach.
     angles : those that were given, at most as many as the kind takes, in its units. side : of the first turn.
     duration : of the log, or of each level of a kind that holds levels [s]; None: the default of the kind.
     passing : time for one ship length at the speed of the approach [s]. interval : between rows of the log [s].

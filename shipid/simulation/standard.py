@@ -134,7 +134,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
         raise ShipidError(
             f"{speed:g} m/s: the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s", path="--speed"
         )
-    _ = controls.drives  # DocumentError where nothing drives her, at any speed
+    _ = controls.drives  # DocumentError where nothing drives it, at any speed
     n = balanced_shaft(controls, speed)
     if n is None:
         raise ShipidError(

@@ -40,7 +40,7 @@ def balanced_shaft_speed(surplus: Callable[[float], float], most: float = MOST_S
 def straight_acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> np.ndarray:
     """Surge, sway and yaw acceleration (3,) [m/s^2, rad/s^2] of the ship straight ahead at u [m/s] in calm water.
 
-    Surge is that of a ship that keeps her trim, as on a steady course: a deep screw would trim her first.
+    Surge is that of a ship that keeps its trim, as on a steady course: a deep screw would trim it first.
 
     commands : command -> value [SI], reached by the actuators; other commands are neutral.
     """
@@ -63,7 +63,7 @@ def yaw_growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> flo
     """Largest real part [1/s] of the eigenvalues of sway and yaw, with what moves with them, in calm water.
 
     Negative where the ship is course-stable (Fossen 2021), -inf where the equations give no number; to the side to
-    which she turns more.
+    which it turns more.
 
     speed : straight ahead [m/s], above 0. orders : commands [SI] that actuators have reached; helms are amidships.
     """

@@ -315,7 +315,7 @@ def hull_values(given: Particulars) -> Values:
         "X_vvvv": TemplateValue(
             min(max(-6.68 * full + 1.1, 0.0), -X_vv),
             "prime",
-            f"-6.68 C_b B / L + 1.1, 0 to -X_vv: no drift drives her ahead, {masumoto}",
+            f"-6.68 C_b B / L + 1.1, 0 to -X_vv: no drift drives it ahead, {masumoto}",
         ),
         "Y_v": TemplateValue(s * (1 + 0.4 * C_b * B / T), "prime", clarke),
         "Y_r": TemplateValue(

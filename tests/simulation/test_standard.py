@@ -42,7 +42,7 @@ def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
     """The Mariner would stop in 0.3 lengths: thrust less resistance is a cubic of u / U_0 - n / n_0."""
     mariner = load_vessel("mariner")
     with pytest.raises(
-        ShipidError, match=r"thruster\.propeller: Mariner .* cannot stop: .* near her service speed alone"
+        ShipidError, match=r"thruster\.propeller: Mariner .* cannot stop: .* near its service speed alone"
     ):
         define_standard(mariner, "stop")
     assert define_standard(mariner, "turning").speed == pytest.approx(7.7175)
