@@ -431,7 +431,7 @@ def four_quadrant(
 
     T = 1/2 rho C_T(beta) (u_P^2 + (0.7 pi n D_p)^2) pi / 4 D_p^2 with the advance angle at 0.7 of the radius, beta =
     atan2(u_P, 0.7 pi n D_p): 0 to 90 deg ahead, 90 to 180 the screw astern while the ship goes ahead (crash stop), -90
-    to 0 the screw ahead while the ship goes astern, -180 to -90 astern. A stopped screw, at +-90 deg, drags. Inflow u_P as
+    to 0 the screw ahead and the ship astern, -180 to -90 astern. A stopped screw, at +-90 deg, drags. Inflow u_P as
     in `propeller_inflow`.
     """
     u_P = propeller_inflow(
