@@ -9,7 +9,7 @@ follow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,16 +18,35 @@ from scipy.special import stdtrit
 
 from shipid.data.dataset import Array
 from shipid.document import short_names
+from shipid.engine.engines import REPEATED
 from shipid.errors import DataError, ShipidError
 from shipid.identification.settings import free_factors
 from shipid.identification.solution import Solution
 from shipid.identification.statistics import Statistics
+from shipid.simulation.measured import MeasuredManoeuvre, measure_all
 from shipid.units import join_names, significant_digits
 from shipid.vessel.load import Vessel
 
-Measure = Callable[[Vessel], Mapping[str, float]]
+Perform = Callable[[Vessel], Mapping[str, Mapping[str, float]]]
+"""Vessel -> title of each manoeuvre that it can perform -> measure -> value."""
+Trial = tuple[str, tuple[float, ...], str]
+"""Kind of a standard manoeuvre, its angles [deg], and side."""
 LONG = 10.0  # a horizon is long from this multiple of the correlation time of the residuals on
 SMALL = 1e-4  # of the standard deviation along the greatest axis of a covariance: shorter axes are left out
+
+
+def perform_trials(vessel: Vessel, trials: Mapping[str, Trial]) -> tuple[dict[str, MeasuredManoeuvre], dict[str, str]]:
+    """Title -> standard manoeuvre in calm water, and title -> reason of those that the vessel cannot perform."""
+    done, refused = dict[str, MeasuredManoeuvre](), dict[str, str]()
+    try:
+        return dict(zip(trials, measure_all(vessel, list(trials.values()), engine=REPEATED), strict=True)), {}
+    except ShipidError:  # one of them: the others may be performed
+        for title, trial in trials.items():
+            try:
+                done[title] = measure_all(vessel, [trial], engine=REPEATED)[0]
+            except ShipidError as error:
+                refused[title] = error.message
+    return done, refused
 
 
 def check_level(level: float | None) -> None:
@@ -36,26 +55,27 @@ def check_level(level: float | None) -> None:
         raise DataError(f"{level} is no level of a band: give a share between 0 and 1, such as 0.9")
 
 
-def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str:
-    """Sentence where the horizon is short against what the residuals remember; empty where it is not.
-
-    spacing : time between residuals of one signal [s]. See `docs/identification-coverage.md`.
-    """
-    horizon = solution.settings.horizon
-    longest = max((one.memory * spacing for one in judged.whiteness.values() if not one.white), default=0.0)
-    if not 0 < horizon < LONG * longest:
-        return ""
-    return (
-        f"the horizon of {horizon:g} s is short against residuals that are correlated over "
-        f"{significant_digits(longest)} s: estimates may be biased beyond any interval; fit whole runs (horizon 0)"
-    )
+def residual_spacing(solution: Solution) -> float:
+    """Median time between residuals of one signal within a run [s], over all runs."""
+    selected = np.array(solution.signals) == solution.signals[0]
+    steps = np.diff(solution.times[selected])[np.diff(solution.clusters[selected]) == 0]
+    return float(np.median(steps)) if len(steps) else solution.settings.step
 
 
-def band_refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
-    """Why no band can be promised, in one sentence; empty where one can."""
-    why = short_horizon(solution, judged, spacing)
-    if why:
-        return why
+def memory_of_signals(solution: Solution, judged: Statistics) -> dict[str, float]:
+    """Signal whose residuals are not white -> their correlation time [s]."""
+    between = residual_spacing(solution)
+    return {name: one.memory * between for name, one in judged.whiteness.items() if not one.white}
+
+
+def band_refusal(solution: Solution, judged: Statistics) -> str:
+    """Why no band can be promised, in one sentence; empty where one can. See `docs/identification-coverage.md`."""
+    horizon, longest = solution.settings.horizon, max(memory_of_signals(solution, judged).values(), default=0.0)
+    if 0 < horizon < LONG * longest:
+        return (
+            f"the horizon of {horizon:g} s is short against residuals that are correlated over "
+            f"{significant_digits(longest)} s: estimates may be biased beyond any interval; fit whole runs (horizon 0)"
+        )
     best = judged.covariances[judged.chosen]
     if not best.trusted:
         return f"the standard errors are not to be trusted: {best.reason}"
@@ -66,39 +86,33 @@ def band_refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
 
 
 def measure_bands(
-    vessel: Vessel,
-    solution: Solution,
-    judged: Statistics,
-    measures: Sequence[tuple[str, Measure]],
-    level: float = 0.9,
+    vessel: Vessel, solution: Solution, judged: Statistics, perform: Perform, level: float = 0.9
 ) -> pd.DataFrame:
     """Band of every measure of some manoeuvres: `manoeuvre`, `measure`, `value`, `deviation`, `low`, `high`, `note`.
 
-    vessel : the base. measures : title of a manoeuvre, and what performs it: vessel -> measure -> value.
-    level : share of such bands that hold the truth; DataError where it is not between 0 and 1.
+    vessel : the base. level : share of such bands that hold the truth; DataError where it is not between 0 and 1.
     """
     check_level(level)
-    free = np.flatnonzero(~(solution.at_bound | solution.held))
-    best = judged.covariances[judged.chosen]
-    axes = principal_axes(best.matrix)
+    best, free = judged.covariances[judged.chosen], solution.free
     quantile = float(stdtrit(np.median(best.freedom), 0.5 + level / 2))
-    at, unknown = vessel.with_values(solution.values), free_factors(vessel, solution.settings)
-    sides = []
-    for axis in axes.T:
+    unknown, sides = free_factors(vessel, solution.settings), list[Mapping[str, Mapping[str, float]]]()
+    refused = "diverges within the interval of the numbers"
+    for axis in principal_axes(best.matrix).T:
         for sign in (1.0, -1.0):
             factors = solution.factors.copy()
             factors[free] += sign * axis
-            sides.append(factors)
-    rows: list[dict[str, Any]] = []
-    for title, measure in measures:
-        try:
-            centre = measure(at)
-            around = [measure(vessel.with_values(unknown.values(factors))) for factors in sides]
-        except ShipidError as error:  # it cannot perform it, or the vessel refuses the numbers
-            rows.append({"manoeuvre": title, "measure": "", "note": error.message})
+            try:
+                sides.append(perform(vessel.with_values(unknown.values(factors))))
+            except ShipidError as error:  # it can perform none, or the vessel refuses the numbers
+                sides.append({})
+                refused = error.message
+    rows = list[dict[str, Any]]()
+    for title, centre in perform(vessel.with_values(solution.values)).items():
+        if not all(title in side for side in sides):
+            rows.append({"manoeuvre": title, "measure": "", "note": refused})
             continue
         for name, value in centre.items():
-            ends = np.array([one.get(name, np.nan) for one in around]).reshape(-1, 2)
+            ends = np.array([side[title].get(name, np.nan) for side in sides]).reshape(-1, 2)
             slopes, bends = (ends[:, 0] - ends[:, 1]) / 2, ends.mean(axis=1) - value
             deviation, shift = float(np.sqrt((slopes**2 + 2 * bends**2).sum())), float(bends.sum())
             wide, note = quantile * deviation, "" if np.isfinite(deviation) else "not reached on both sides of an axis"

@@ -19,7 +19,6 @@ import numpy as np
 
 from shipid.data.dataset import Array, Dataset
 from shipid.document import short_names
-from shipid.identification.covariance import invert_information
 from shipid.identification.fit import local_linearisation
 from shipid.identification.residuals import build_problem
 from shipid.identification.solution import Solution
@@ -48,9 +47,7 @@ def interval_end_ratios(judged: Statistics, at: Beside, profiled: Sequence[str] 
     fit, wide = judged.fit, _wide_factors(judged, profiled)
     if not wide:
         return {}
-    places = np.array([fit.paths.index(path) for path in judged.free])
-    J, precision = fit.jacobian[:, places], 0.0 if fit.prior_widths is None else 1 / fit.prior_widths[places] ** 2
-    inverse = invert_information(J.T @ J + np.diag(precision * np.ones(len(places))))[0]
+    places, inverse = fit.free, judged.basis.inverse
     least = float(np.square(at(np.zeros(len(fit.paths)))[0]).sum())
     result = {}
     for j in wide:
@@ -93,32 +90,17 @@ def curvature_sentence(judged: Statistics, seen: Mapping[str, tuple[float, float
     )
 
 
-def curvature_warning(
-    solution: Solution,
-    dataset: Dataset,
-    judged: Statistics,
-    profiled: Sequence[str] = (),
-    go_on: Callable[[], None] = lambda: None,
-) -> str:
-    """The sentence on intervals that are too short; none: empty.
-
-    profiled : factors that have a profile. go_on : called before each prediction; what it raises ends the look.
-    """
+def curvature_warning(solution: Solution, dataset: Dataset, judged: Statistics, profiled: Sequence[str] = ()) -> str:
+    """The sentence on intervals that are too short; none: empty. profiled : factors that have a profile."""
     if not _wide_factors(judged, profiled):
         return ""
     problem = build_problem(solution.vessel, dataset, solution.runs, solution.settings)
     at = local_linearisation(problem, solution.factors, solution.point)
-
-    def next_at(change: Array) -> tuple[Array, Array]:
-        go_on()
-        return at(change)
-
-    return curvature_sentence(judged, interval_end_ratios(judged, next_at, profiled))
+    return curvature_sentence(judged, interval_end_ratios(judged, at, profiled))
 
 
 def _wide_factors(judged: Statistics, profiled: Sequence[str]) -> list[int]:
     """Places among the free factors of those that are identified, not profiled, with intervals that are not narrow."""
-    places = [judged.fit.paths.index(path) for path in judged.free]
     half, size = judged.high - judged.fit.factors, np.abs(judged.fit.factors)
     wide = judged.identifiable & (half > NARROW * size)
-    return [j for j, place in enumerate(places) if wide[place] and judged.free[j] not in profiled]
+    return [j for j, place in enumerate(judged.fit.free) if wide[place] and judged.free[j] not in profiled]

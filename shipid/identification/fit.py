@@ -98,17 +98,16 @@ def search_factors(
 
     Raises KeyboardInterrupt for Ctrl-C, after the current iteration. Errors raised by `progress` are passed on.
     """
-    free = problem.unknown.low < problem.unknown.high
     with hold_interrupts() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
-        watch = _IterationMonitor(progress, held, before)
-        run = _SearchState(
-            problem, evaluate_factors(problem, begin, best_valley(problem, begin, point) or point), free, watch
-        )
-        if not np.isfinite(run.start.objective):
-            return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
-        word = run.to_the_end(tolerance, most)
-    return Result(run.best.factors, run.best.at, run.best.objective, watch.iterations, word)
+        start = evaluate_factors(problem, begin, best_valley(problem, begin, point) or point)
+        if not np.isfinite(start.objective):
+            return Result(begin, start.at, float("inf"), before, "diverged")
+        run = _SearchState(problem, start, progress, held, before)
+        word, at_bound = run.minimise(tolerance, most), run.pushed()
+        if word == "ok" and at_bound.any():
+            word = run.settle(at_bound, tolerance, most)
+    return Result(run.best.factors, run.best.at, run.best.objective, run.iterations, word)
 
 
 def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
@@ -157,37 +156,24 @@ class _Evaluation:
         return total if np.isfinite(total) else float("inf")
 
 
-@dataclass
-class _IterationMonitor:
-    """Reports iterations to `progress`. held : Ctrl-C deferred by `hold_interrupts`. iterations : count so far."""
-
-    progress: Progress | None
-    held: list[int]
-    iterations: int
-
-    def stops(self, objective: float) -> bool:
-        """Report an iteration; True if `progress` or Ctrl-C asks to stop."""
-        asked = self.progress is not None and bool(self.progress(self.iterations, objective))
-        return asked or bool(self.held)
-
-
 class _SearchState:
-    """State of one search: the last, the best and the first evaluation, and which factors are free."""
+    """State of one search: the last and the best evaluation, which factors are free, and whether it is to stop.
 
-    def __init__(self, problem: Problem, start: _Evaluation, free: NDArray[np.bool_], watch: _IterationMonitor) -> None:
-        self.problem, self.free, self.watch = problem, free, watch
-        self.last = self.best = self.start = start
-        self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
+    held : Ctrl-C deferred by `hold_interrupts`. iterations : count so far.
+    """
 
-    def stops(self) -> bool:
-        """Whether `progress` or Ctrl-C has asked to stop."""
-        return self._stopped
+    def __init__(
+        self, problem: Problem, start: _Evaluation, progress: Progress | None, held: list[int], iterations: int
+    ) -> None:
+        self.problem, self.free = problem, problem.unknown.low < problem.unknown.high
+        self.last = self.best = start
+        self.progress, self.held, self.iterations, self.stopped = progress, held, iterations, False
+        self._report(start.objective)
 
-    def to_the_end(self, tolerance: float, most: int) -> str:
-        """Search, and once more with the factors on their bounds that were pushed there; the status."""
-        word = self.minimise(tolerance, most)
-        at_bound = self.pushed()
-        return self.settle(at_bound, tolerance, most) if word == "ok" and at_bound.any() else word
+    def _report(self, objective: float) -> None:
+        """Report an iteration; `progress` or Ctrl-C may ask to stop."""
+        asked = self.progress is not None and bool(self.progress(self.iterations, objective))
+        self.stopped = asked or bool(self.held)
 
     def _at(self, x: Array) -> _Evaluation:
         factors = self.best.factors.copy()
@@ -199,9 +185,9 @@ class _SearchState:
         return self.last
 
     def _after(self, intermediate_result: OptimizeResult) -> None:
-        self.watch.iterations += 1
-        if self.watch.stops(2 * float(intermediate_result.cost)):
-            self._stopped = True
+        self.iterations += 1
+        self._report(2 * float(intermediate_result.cost))
+        if self.stopped:
             raise StopIteration
 
     def minimise(self, tolerance: float, most: int) -> str:
@@ -210,7 +196,7 @@ class _SearchState:
         Where kinks of the equations (|v|, |r|) have stopped the short steps of a region, and a long Gauss-Newton step
         still goes down, the search goes on from there with a fresh region and scale.
         """
-        if self.stops():
+        if self.stopped:
             return "stopped"
         if not self.free.any():
             return "ok"
@@ -222,7 +208,7 @@ class _SearchState:
             if not self._stride():
                 crossings += 1
                 if crossings > CROSSINGS or not self._across():
-                    return "stopped" if self.stops() else word
+                    return "stopped" if self.stopped else word
             word = self._minimise(tolerance, most)
             if word == "stopped":
                 return word
@@ -260,17 +246,14 @@ class _SearchState:
         draw, around, misses, first = np.random.default_rng(0), AROUND, 0, self.best.objective
         for _ in range(ROUNDS):
             free = self.free & ~self.pushed()
-            if misses == MISSES or self.stops() or not self._promises(free):
-                break
+            promised = _gauss_newton(self.best.J[:, free], self.best.f)[2]
+            if misses == MISSES or self.stopped or promised <= FALL * self.best.objective:
+                break  # the derivatives promise no such fall, as they do in a kink
             if self._taken(free, self._sampled(free, draw, around), FALL / ROUNDS):
                 around, misses = min(3 * around, AROUND), 0
             else:
                 around, misses = around / 10, misses + 1
         return self.best.objective < first * (1 - FALL)
-
-    def _promises(self, free: NDArray[np.bool_]) -> bool:
-        """Whether the derivatives at the best point promise a fall by the share `FALL`, as they do in a kink."""
-        return _gauss_newton(self.best.J[:, free], self.best.f)[2] > FALL * self.best.objective
 
     def _sampled(self, free: NDArray[np.bool_], draw: np.random.Generator, around: float) -> Array:
         """Gauss-Newton step (free,) for the sum of the squares linearised at the best point and at points around it."""
@@ -303,7 +286,7 @@ class _SearchState:
             max_nfev=most,
             callback=self._after,
         )
-        if self.stops():
+        if self.stopped:
             return "stopped"
         return "not converged" if result.status == 0 else "ok"
 

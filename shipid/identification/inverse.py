@@ -20,11 +20,11 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
+from shipid.identification.settings import ENVIRONMENT
 from shipid.physics.signals import is_wrapped_angle
 from shipid.simulation.log import body_velocities
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
@@ -37,23 +37,7 @@ STRIDE = 4  # bumps begin a quarter of their length apart
 ROUNDS, SETTLED, HALVINGS = 20, 1e-5, 6  # SETTLED: of the levels; factors that are not seen may wander on
 RANK = 1e-8  # of the largest singular value, with columns of unit length: below it a step is left out
 LOOSE = 1.0  # base values: widest prior
-PROBE, CURVED = 0.05, 1e-6  # change of factors at which columns are compared, and what of a column may change
-
-
-@dataclass(frozen=True)
-class Inverse:
-    """Result of inverse dynamics.
-
-    paths, factors : first path of each group, and its factor (n,). linear : (n,) whether forces are linear in it.
-    jacobian : (m, n) d residual / d factor, residuals over their standard deviation.
-    levels : velocity (u, v, r) -> standard deviation of the residuals of its equation [m/s^2, rad/s^2].
-    """
-
-    paths: tuple[str, ...]
-    factors: Array
-    linear: NDArray[np.bool_]
-    jacobian: Array
-    levels: Mapping[str, float]
+CHANNEL = f"{ENVIRONMENT}."
 
 
 def inverse_dynamics(
@@ -61,39 +45,34 @@ def inverse_dynamics(
     dataset: Dataset,
     runs: Sequence[str],
     groups: Sequence[Sequence[str]],
-    *,
-    scale: Sequence[Sequence[float]] | None = None,
-    prior: Array | None = None,
-    environment: Mapping[str, Mapping[str, float]] | None = None,
-) -> Inverse:
-    """Fit factors so that the forces explain the motion of the runs.
+    scale: Sequence[Sequence[float]],
+    prior: Array,
+    overrides: Mapping[str, Mapping[str, float]],
+) -> tuple[Array, dict[str, float]]:
+    """Factors (n,) with which the forces explain the motion of the runs, and the levels of what is left.
 
-    groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's.
+    groups : parameters that share each of the n factors. scale : their values at factor 1.
     prior : (n,) standard deviation of each factor about its base (1, or 0 where that is 0), at most 1.
-    environment : run -> channel -> constant value [SI] of channels that are not logged; default: 0.
+    overrides : run -> values of `resolve_overrides`, of which those of the environment count; others are 0.
 
-    Raises DataError for an unknown run, a command that is not logged, runs too short for one bump.
+    The levels are velocity (u, v, r) -> standard deviation of the residuals of its equation [m/s^2, rad/s^2].
+    Raises DataError for runs too short for one bump.
     """
-    base = vessel.parameters
-    tied = [list(group) for group in groups]
-    sizes = (
-        [[base[path] for path in group] for group in tied]
-        if scale is None
-        else [list(sizes_of_group) for sizes_of_group in scale]
-    )
-    paths = tuple(group[0] for group in tied)
-    centre = np.array([0.0 if base[path] == 0 else 1.0 for path in paths])
-    given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
-    widths = np.minimum(given, LOOSE)
     model = vessel_dynamics(vessel)
-    problem = _Problem(vessel, model, tied, sizes, _long_stretches(vessel, model, dataset, runs, environment or {}))
-    linear = problem.linear(centre)
-    factors, levels = _solve_weighted(problem, centre, widths, bool(linear.all()))
-    weight = np.array([1 / levels[name] for name in problem.signals])
-    return Inverse(paths, factors, linear, problem.evaluate(factors)[1] * weight[:, None], levels)
+    stretches = [
+        stretch
+        for run, rows in stretches_of_runs(dataset)
+        if run in runs and len(rows) > LEAST_SAMPLES
+        for stretch in [_weighted_stretch(vessel, model, rows, overrides.get(run, {}))]
+        if len(stretch.pull)
+    ]
+    if not stretches:
+        raise DataError(f"no stretch of these runs is longer than {LEAST_SAMPLES} rows and the window", path="runs")
+    centre = np.array([0.0 if vessel.parameters[group[0]] == 0 else 1.0 for group in groups])
+    return _solve_weighted(_Problem(vessel, model, groups, scale, stretches), centre, np.minimum(prior, LOOSE))
 
 
-def _solve_weighted(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tuple[Array, dict[str, float]]:
+def _solve_weighted(problem: _Problem, centre: Array, widths: Array) -> tuple[Array, dict[str, float]]:
     """Gauss-Newton with step halving on weighted residuals and priors: factors (n,), levels.
 
     Minimum-norm steps keep undetermined factors at their base.
@@ -109,9 +88,9 @@ def _solve_weighted(problem: _Problem, centre: Array, widths: Array, linear: boo
         step = -np.linalg.lstsq(rows / lengths, left, rcond=RANK)[0] / lengths
         for _ in range(HALVINGS):
             trial = factors + step
-            evaluated = (residual + jacobian @ step, jacobian) if linear else problem.evaluate(trial)
+            evaluated = problem.evaluate(trial)
             cost = float(((evaluated[0] * weight) ** 2).sum() + (((trial - centre) / widths) ** 2).sum())
-            if linear or cost <= float(left @ left):
+            if cost <= float(left @ left):
                 break
             step = step / 2
         else:
@@ -147,8 +126,8 @@ class _Problem:
         self,
         vessel: Vessel,
         model: Dynamics,
-        groups: list[list[str]],
-        scales: list[list[float]],
+        groups: Sequence[Sequence[str]],
+        scales: Sequence[Sequence[float]],
         stretches: Sequence[_Stretch],
     ) -> None:
         self.stretches = stretches
@@ -199,14 +178,6 @@ class _Problem:
         least = 1e-12 * max(max(rms.values()), 1e-12)
         return {name: max(value, least) for name, value in rms.items()}
 
-    def linear(self, factors: Array) -> NDArray[np.bool_]:
-        """Mask (n,): whether each column of the Jacobian stays constant when all factors change."""
-        rng = np.random.default_rng(0)
-        before = self.evaluate(factors)[1]
-        after = self.evaluate(factors + PROBE * rng.uniform(0.5, 1.0, len(factors)))[1]
-        size = np.linalg.norm(before, axis=0)
-        return np.asarray(np.linalg.norm(after - before, axis=0) <= CURVED * np.maximum(size, 1e-300))
-
 
 @lru_cache(maxsize=16)
 def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
@@ -235,28 +206,6 @@ def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
     return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
 
 
-def _long_stretches(
-    vessel: Vessel,
-    model: Dynamics,
-    dataset: Dataset,
-    runs: Sequence[str],
-    environment: Mapping[str, Mapping[str, float]],
-) -> list[_Stretch]:
-    missing = next((name for name in runs if name not in dataset.runs), None)
-    if missing is not None:
-        raise DataError(f"no run {missing!r}", path="runs")
-    result = []
-    for run, rows in stretches_of_runs(dataset):
-        if run not in runs or len(rows) <= LEAST_SAMPLES:
-            continue
-        stretch = _weighted_stretch(vessel, model, rows, environment.get(run, {}))
-        if stretch is not None:
-            result.append(stretch)
-    if not result:
-        raise DataError(f"no stretch of these runs is longer than {LEAST_SAMPLES} rows and the window", path="runs")
-    return result
-
-
 def _test_function_width(vessel: Vessel, rows: pd.DataFrame) -> float:
     """Time [s] for one ship length at the run's speed, at least 8 samples, at most a quarter of the run."""
     t = rows["t"].to_numpy()
@@ -269,28 +218,21 @@ def _weighted_stretch(
     vessel: Vessel,
     model: Dynamics,
     rows: pd.DataFrame,
-    environment: Mapping[str, float],
-) -> _Stretch | None:
-    """One stretch with its weights; None if it is shorter than a test function."""
+    overrides: Mapping[str, float],
+) -> _Stretch:
+    """One stretch with its weights, none if it is shorter than a test function."""
     t = rows["t"].to_numpy(dtype=float)
     columns = {str(name): rows[name].to_numpy() for name in rows.columns if name not in ("run", "t", "flags")}
     columns |= {name: np.unwrap(columns[name]) for name in columns if is_wrapped_angle(name)}
-    absent = next((name for name in model.commands if name not in columns), None)
-    if absent is not None:
-        raise DataError(
-            f"command {absent!r} is missing in the log, and {vessel.name} needs it", path=str(rows["run"].iloc[0])
-        )
     zero = np.zeros(len(t))
     columns |= {**body_velocities(columns), "down": columns.get("z", zero)}
     state = np.array([columns.get(name, zero) for name in (*model.state, *model.hidden)])
     commands = np.array([columns[name] for name in model.commands]).reshape(-1, len(t))
     reached = memory_along(vessel, {name: columns[name] for name in model.commands}, t) or {}
     memory = np.array([reached[name] for name in model.memory]).reshape(-1, len(t))
-    given = {name: np.full(len(t), environment[name]) for name in model.environment if name in environment}
-    weather = np.array([given.get(name, columns.get(name, zero)) for name in model.environment]).reshape(-1, len(t))
+    columns |= {path.partition(".")[2]: np.full(len(t), x) for path, x in overrides.items() if path.startswith(CHANNEL)}
+    weather = np.array([columns.get(name, zero) for name in model.environment]).reshape(-1, len(t))
     before, after, pull = _test_functions(t, _test_function_width(vessel, rows))
-    if not len(pull):
-        return None
     # an order is held until the next row, so where it changes the end of the interval is an additional point
     changed = 1 + np.flatnonzero((np.diff(commands, axis=1) != 0).any(axis=0))
     rows_at = np.append(np.arange(len(t)), changed)

@@ -15,10 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 from scipy.special import stdtrit
 
 from shipid.data.dataset import Array
-from shipid.identification.statistics import LEVEL, Statistics, declared_error
+from shipid.identification.statistics import LEVEL, Statistics
 
 Refit = Callable[[str, float, Array], tuple[float, Array]]
 """(path, value at which its factor is held, factors to start from (n,)) -> objective, factors (n,)."""
@@ -46,6 +47,12 @@ class Profile:
     high: float
     failed: int
     sentence: str
+
+
+def profile_table(curve: Profile) -> pd.DataFrame:
+    """The points of a profile: `factor`, `rise`, and in every row `path`, `limit`, `sentence`."""
+    points = pd.DataFrame({"factor": curve.values, "rise": curve.rises})
+    return points.assign(path=curve.path, limit=curve.limit, sentence=curve.sentence)
 
 
 @dataclass
@@ -173,5 +180,5 @@ def _profile_sentence(path: str, unit: str, low: float, high: float, tried: Sequ
 
 def variance_ratio(judged: Statistics, path: str) -> float:
     """s^2 for the profile of one factor: its variance in the chosen form, over that for the declared deviations."""
-    j = judged.fit.paths.index(path)
-    return float((judged.errors[j] / declared_error(judged.fit, path)) ** 2)
+    j = judged.free.index(path)
+    return float(judged.errors[judged.fit.free[j]] ** 2 / judged.basis.inverse[j, j])

@@ -130,19 +130,27 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
     scalars |= {path: (0.0, 0.0) for path in unknown.paths if path in scalars}  # one for all runs: a factor
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
-    numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
-    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers, settings.commands)
-    weather = _given_environment(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
+    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, overridden, settings.commands)
     _check_set_for_a_run(unknown, overridden, widths)
+    given = {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
+    given |= {name for one in segments for name in model.environment if np.any(one.columns.get(name, 0.0))}
+    given -= set(CURRENT) if set(NUISANCES["current"]) & set(names) else set()
     return Problem(
         vessel=vessel,
         runs=tuple(runs),
         settings=settings,
         unknown=unknown,
         layout=FitLayout(
-            model, groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
+            model=model,
+            groups=groups,
+            signals=tuple(settings.signals),
+            nuisances=names,
+            weather=tuple(name for name in model.environment if name in given),
+            lags=lags,
+            step=settings.step,
+            method=settings.method,
         ),
-        segments=tuple(_with_weather(segment, weather, overridden[runs[segment.run]]) for segment in segments),
+        segments=tuple(segments),
         base=np.array(
             [[overridden[run].get(path, value) for path, value in vessel.parameters.items()] for run in runs]
         ),
@@ -204,32 +212,6 @@ def _check_set_for_a_run(
             raise DocumentError(message, path=f"{BLOCK}.runs.{run}.{path}")
 
 
-def _given_environment(
-    segments: Sequence[ShootingSegment],
-    overridden: Mapping[str, Mapping[str, float]],
-    channels: Sequence[str],
-    estimated: Sequence[str],
-) -> list[str]:
-    """Environment channels that the data or an override provide and that the fit does not estimate."""
-    given = {name for name in channels if any(np.any(one.columns[name]) for one in segments if name in one.columns)}
-    given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
-    return [name for name in channels if name in given and not (estimated and name in CURRENT)]
-
-
-def _with_weather(segment: ShootingSegment, weather: Sequence[str], overridden: Mapping[str, float]) -> ShootingSegment:
-    zero = np.zeros_like(segment.t)
-    columns = {
-        **segment.columns,
-        **{name: segment.columns.get(name, zero) for name in weather},
-        **{
-            name: zero + overridden[f"{ENVIRONMENT}.{name}"]
-            for name in weather
-            if f"{ENVIRONMENT}.{name}" in overridden
-        },
-    }
-    return ShootingSegment(segment.run, segment.t, columns, segment.earlier, segment.memory, segment.measured)
-
-
 @dataclass(frozen=True)
 class Evaluation:
     """Output of the engine for S predictions of N steps.
@@ -289,7 +271,8 @@ class Predictions:
         columns = [
             commands[name][at + layout.lags - j] for j in range(layout.lags + 1) for name in layout.model.commands
         ]
-        return columns + [segment.columns[name][at] for name in layout.weather]
+        still = np.zeros_like(segment.t)
+        return columns + [segment.columns.get(name, still)[at] for name in layout.weather]
 
     def _seen(self, segment: ShootingSegment) -> tuple[Array, Array, Array]:
         """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""

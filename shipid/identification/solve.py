@@ -22,7 +22,7 @@ from shipid.identification.residuals import CURRENT, Problem, build_problem, typ
 from shipid.identification.settings import BLOCK, ENVIRONMENT, NUISANCES, Identify, run_overrides, weighted_columns
 from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
-from shipid.identification.statistics import LinearFit, residual_whiteness
+from shipid.identification.statistics import Basis, residual_whiteness
 from shipid.units import percent_text, significant_digits
 from shipid.vessel.load import Vessel
 
@@ -88,7 +88,7 @@ def identify(
 
 def _discount_residuals(solution: Solution) -> tuple[Identify, dict[str, float]]:
     """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
-    settings, seen = solution.settings, residual_whiteness(LinearFit.of(solution))
+    settings, seen = solution.settings, residual_whiteness(solution, Basis.of_none(solution))
     factors = {
         name: max(
             float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in weighted_columns(name)])),
@@ -326,6 +326,11 @@ def _build_solution(problem: Problem, result: Result, objective_start: float, se
         sentence=sentence,
         at_bound=at_bound,
         held=unknown.low == unknown.high,
+        dropped=(),
+        sizes=tuple(
+            (scales[0], problem.vessel.units.get(path, "m/s"))
+            for path, scales in zip(unknown.paths, unknown.scale, strict=True)
+        ),
         point=_result_point(result),
         within=end.within(settings.linear_from),
     )

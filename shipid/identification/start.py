@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from shipid.identification.fit import BEGIN, Progress, Result, initial_point, se
 from shipid.identification.inverse import inverse_dynamics
 from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.segments import ShootingSegment
-from shipid.identification.settings import ENVIRONMENT, resolve_overrides
+from shipid.identification.settings import resolve_overrides
 
 HORIZONS = (2.0, 5.0, 15.0, 60.0)  # s
 ENOUGH = 20000  # steps of all predictions of a short horizon: more take time and change a start little
@@ -66,24 +65,12 @@ def _spread_segments(problem: Problem) -> tuple[ShootingSegment, ...]:
 
 def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
     """Initial factors (n,) by inverse dynamics, clipped to the bounds."""
-    unknown = problem.unknown
-    given = resolve_overrides(
-        problem.settings, problem.runs, problem.vessel, problem.layout.model.environment, dataset.runs
+    unknown, groups, vessel = problem.unknown, problem.layout.groups, problem.vessel
+    known = problem.layout.model.environment
+    overrides = resolve_overrides(problem.settings, problem.runs, vessel, known, dataset.runs)
+    own = slice(len(groups))
+    factors, _ = inverse_dynamics(
+        vessel, dataset, problem.runs, groups, unknown.scale[own], unknown.prior[own], overrides
     )
-    head = f"{ENVIRONMENT}."
-    weather: Mapping[str, Mapping[str, float]] = {
-        run: {key.removeprefix(head): value for key, value in values.items() if key.startswith(head)}
-        for run, values in given.items()
-    }
-    groups = problem.layout.groups
-    estimate = inverse_dynamics(
-        problem.vessel,
-        dataset,
-        problem.runs,
-        groups,
-        scale=unknown.scale[: len(groups)],
-        prior=unknown.prior[: len(groups)],
-        environment=weather,
-    )
-    factors = np.append(estimate.factors, [BEGIN[path] for path in unknown.paths[len(groups) :]])
+    factors = np.append(factors, [BEGIN[path] for path in unknown.paths[len(groups) :]])
     return np.asarray(np.clip(factors, unknown.low, unknown.high))

@@ -17,7 +17,7 @@ from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.settings import Identify
 from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, fit_statistics
+from shipid.identification.statistics import fit_statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.dynamics import vessel_dynamics
@@ -312,7 +312,7 @@ def test_standard_errors_of_huber_are_those_of_its_theory(sharper: float, bad: f
     density /= density.sum()
     variance = (density @ np.clip(x, -k, k) ** 2) / density[np.abs(x) <= k].sum() ** 2
     plain = np.sqrt(np.diag(np.linalg.inv(known.jacobian.T @ known.jacobian)))
-    errors = fit_statistics(LinearFit.of(solution)).covariances["fisher"].errors
+    errors = fit_statistics(solution).covariances["fisher"].errors
     np.testing.assert_allclose(errors / plain, np.sqrt(variance), rtol=0.15)
 
 
@@ -325,7 +325,7 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     assert [path for path, there in zip(solution.paths, solution.held, strict=True) if there] == [
         path for path in solution.paths if path in solution.dropped
     ]
-    judged = fit_statistics(LinearFit.of(solution))
+    judged = fit_statistics(solution)
     assert np.isinf(judged.errors[solution.held]).all()
     assert "dropped" in judged.sentences[solution.paths.index(solution.dropped[0])]
     for path in solution.dropped:
@@ -495,7 +495,7 @@ def test_intervals_of_discounted_fits_cover(noise: str) -> None:
             data = changed(clean, **{n: clean.frame[n] + rng.normal(0, w, len(clean.frame)) for n, w in widths.items()})
         base = SHIP.with_values({path: SHIP.parameters[path] / rng.normal(1, 0.1) for path in FEW})
         solution = identify(base, data, data.runs, settings(prior={"hull.*": 0.1}, discount=True))
-        known, true = fit_statistics(LinearFit.of(solution)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
+        known, true = fit_statistics(solution), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
         low, high = known.low[: len(FEW)], known.high[: len(FEW)]  # a current may follow
         held += ((low <= true) & (true <= high)).tolist()
     assert np.mean(held) > 0.90 - 2 * (0.9 * 0.1 / len(held)) ** 0.5

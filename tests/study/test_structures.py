@@ -28,7 +28,6 @@ from shipid.study.structures import (
     _structure_table,
     _with_mean,
     compare_structures,
-    structures_content,
     uninformative_structures,
     with_actuators_on,
     write_chosen_structure,
@@ -110,7 +109,7 @@ def test_the_structure_that_made_the_data_is_chosen(comparison: StructureCompari
 def test_the_vessel_chosen_and_the_page_are_written(comparison: StructureComparison, tmp_path: Path) -> None:
     again = load_vessel(str(write_chosen_structure(comparison, tmp_path / "chosen.toml")))
     assert again.parameters == pytest.approx(comparison.fits[comparison.chosen].vessel.parameters)
-    page = write_structures(structures_content(comparison, "log.parquet", "shipid identify"), tmp_path / "page.html")
+    page = write_structures(comparison.page("log.parquet", "shipid identify"), tmp_path / "page.html")
     text = page.read_text()
     for word in ("modulus", "abkowitz", "tactical diameter", "Which structure"):
         assert word in text
