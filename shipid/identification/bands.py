@@ -20,8 +20,8 @@ from shipid.data.dataset import Array
 from shipid.document import short_names
 from shipid.engine.engines import REPEATED
 from shipid.errors import DataError, ShipidError
+from shipid.identification.fit import Solution
 from shipid.identification.settings import free_factors
-from shipid.identification.solution import Solution
 from shipid.identification.statistics import Statistics
 from shipid.simulation.measured import MeasuredManoeuvre, measure_all
 from shipid.units import join_names, significant_digits

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.document import short_names
@@ -97,3 +98,14 @@ def _scaled_gram(jacobian: Array) -> Array:
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
     return np.asarray(scaled.T @ scaled)
+
+
+def invert_information(information: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Pseudo-inverse (n, n) of an information matrix, and a mask (n,) of parameters along its null directions."""
+    scale = np.sqrt(np.diag(information))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    silent = values <= UNSEEN * max(float(values[-1]), UNSEEN)
+    kept = vectors[:, ~silent]
+    inverse = (kept / values[~silent]) @ kept.T / np.outer(scale, scale)
+    return inverse, np.asarray((np.abs(vectors[:, silent]) > np.sqrt(UNSEEN)).any(axis=1))

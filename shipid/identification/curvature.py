@@ -19,9 +19,8 @@ import numpy as np
 
 from shipid.data.dataset import Array, Dataset
 from shipid.document import short_names
-from shipid.identification.fit import local_linearisation
+from shipid.identification.fit import Solution, local_linearisation
 from shipid.identification.residuals import build_problem
-from shipid.identification.solution import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import join_names
 

@@ -34,7 +34,7 @@ from shipid.identification.bands import (
     residual_spacing,
 )
 from shipid.identification.curvature import curvature_warning
-from shipid.identification.fit import Progress
+from shipid.identification.fit import Progress, Solution
 from shipid.identification.free_run import (
     ALL,
     ERRORS_OF,
@@ -48,7 +48,6 @@ from shipid.identification.plausible import implausibility
 from shipid.identification.profile import Profile, profile_factor, profile_table, variance_ratio
 from shipid.identification.reach import data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import (
     Statistics,
@@ -542,13 +541,13 @@ def _next_manoeuvres(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, judged: Statistics
 ) -> tuple[pd.DataFrame, str]:
     """Ranked manoeuvres at the median speed of the fitted runs and at half, and a sentence on those that cannot be."""
-    speed, limits = design.recorded_limits(vessel, dataset, runs)
+    speed, most = design.recorded_limits(vessel, dataset, runs)
     unknown, settings = free_factors(solution.vessel, solution.settings), solution.settings
     own = sum(path in vessel.parameters for path in unknown.paths)  # no manoeuvre has the current
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     try:
-        choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), limits)
+        choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), most)
         settings = settings.model_copy(update={"weights": spread})
         contributions = design.information_where_possible(solution.vessel, choice, settings, solution.factors[:own])
     except ShipidError as error:  # no shaft speed gives these speeds, or the ship has no length

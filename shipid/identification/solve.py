@@ -14,14 +14,29 @@ from numpy.typing import NDArray
 from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
-from shipid.identification.covariance import invert_information
-from shipid.identification.diagnosis import diagnose
-from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_factors, initial_point, search_factors
+from shipid.identification.collinearity import invert_information
+from shipid.identification.diagnosis import diagnose, fit_forces
+from shipid.identification.fit import (
+    BEGIN,
+    Point,
+    Progress,
+    Result,
+    Solution,
+    evaluate_factors,
+    initial_point,
+    search_factors,
+)
 from shipid.identification.late import COARSE, row_interval
 from shipid.identification.residuals import CURRENT, Problem, build_problem, typical_errors
-from shipid.identification.settings import BLOCK, ENVIRONMENT, NUISANCES, Identify, run_overrides, weighted_columns
-from shipid.identification.solution import Solution
-from shipid.identification.start import by_inverse_dynamics, grow_horizon
+from shipid.identification.segments import ShootingSegment
+from shipid.identification.settings import (
+    BLOCK,
+    ENVIRONMENT,
+    NUISANCES,
+    Identify,
+    run_overrides,
+    weighted_columns,
+)
 from shipid.identification.statistics import Basis, residual_whiteness
 from shipid.units import percent_text, significant_digits
 from shipid.vessel.load import Vessel
@@ -34,6 +49,10 @@ HALVINGS = 3  # of the default step, at most, as `study new` does
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
 UNEVEN = 0.01  # of the time between rows: a difference above it counts
 FAR = 0.05  # of the time in which a ship goes her length: between rows so far apart, lines miss how she turns
+LOOSE = 1.0  # base values: widest prior of a start by inverse dynamics
+HORIZONS = (2.0, 5.0, 15.0, 60.0)  # s
+ENOUGH = 20000  # steps of all predictions of a short horizon: more take time and change a start little
+ROUGH, MOST = 1e-3, 25  # tolerance and evaluations of a short horizon
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
 """Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
@@ -381,3 +400,60 @@ def _hold_factor(problem: Problem, number: int, target: float) -> Problem:
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
     return replace(problem, unknown=replace(problem.unknown, low=low, high=high))
+
+
+def grow_horizon(
+    problem: Problem, dataset: Dataset, factors: Array, progress: Progress | None = None, before: int = 0
+) -> tuple[Array, int, bool]:
+    """Initial factors by fits over growing horizons, each shorter than the horizon of the fit.
+
+    Returns factors (n,), number of iterations including those `before`, and whether `progress` asked to stop.
+    """
+    longest = max(segment.num_steps for segment in problem.segments) * problem.settings.step
+    iterations = before
+    for horizon in HORIZONS:
+        steps = max(2, round(horizon / problem.settings.step))
+        if steps * problem.settings.step >= longest:
+            break
+        result = _fit_at_horizon(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
+        if result is None or not np.isfinite(result.objective):
+            continue
+        factors, iterations = result.factors, result.iterations
+        if result.status == "stopped":
+            return factors, iterations, True
+    return factors, iterations, False
+
+
+def _fit_at_horizon(
+    problem: Problem, dataset: Dataset, factors: Array, horizon: float, progress: Progress | None, before: int
+) -> Result | None:
+    """Result of the fit with a shorter horizon [s]; None if the runs cannot be cut into such segments."""
+    widths = {name: width for name, width in problem.settings.widths.items() if name != "initial_state"}
+    settings = problem.settings.model_copy(update={"horizon": horizon, "nuisance": widths})
+    try:
+        short = build_problem(problem.vessel, dataset, problem.runs, settings)
+    except DataError:
+        return None
+    short = replace(short, unknown=problem.unknown, segments=_spread_segments(short))
+    return search_factors(short, factors, initial_point(short), progress, before=before, tolerance=ROUGH, most=MOST)
+
+
+def _spread_segments(problem: Problem) -> tuple[ShootingSegment, ...]:
+    """A subset of the segments at equal distances, at least one of every run, with about `ENOUGH` steps in all."""
+    steps = sum(segment.num_steps for segment in problem.segments)
+    every = max(1, round(steps / ENOUGH))
+    runs = [[one for one in problem.segments if one.run == run] for run in range(len(problem.runs))]
+    return tuple(one for of_run in runs for one in of_run[::every])
+
+
+def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
+    """Initial factors (n,) with which the forces explain the measured motion, clipped to the bounds."""
+    unknown, vessel, own = problem.unknown, problem.vessel, len(problem.layout.groups)
+    place = {path: number for number, path in enumerate(vessel.parameters)}
+    spread = np.zeros((len(place), own))
+    for j, group in enumerate(problem.layout.groups):
+        spread[[place[path] for path in group], j] = unknown.scale[j]
+    widths = np.minimum(unknown.prior[:own], LOOSE)
+    factors = fit_forces(vessel, dataset, problem.runs, spread, unknown.centre[:own], widths)
+    factors = np.append(factors, [BEGIN[path] for path in unknown.paths[own:]])
+    return np.asarray(np.clip(factors, unknown.low, unknown.high))

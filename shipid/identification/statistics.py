@@ -35,8 +35,7 @@ from scipy.special import chdtrc, chdtri, stdtrit
 
 from shipid.document import short_names
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Combination, collinear_sets
-from shipid.identification.covariance import invert_information
+from shipid.identification.collinearity import Combination, collinear_sets, invert_information
 from shipid.units import join_names, significant_digits
 
 Array = NDArray[np.float64]

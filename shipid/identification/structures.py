@@ -13,17 +13,18 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from shipid import document as documents
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
-from shipid.identification.inverse import force_equations
 from shipid.identification.settings import Identify, measured_constants, without_zeros
 from shipid.physics.signals import is_steering
-from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.perturb import select_paths
 
@@ -215,6 +216,33 @@ def _sample_states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dic
             low = -high
         result[name] = np.concatenate([some[name].to_numpy(dtype=float), rng.uniform(low, high, SAMPLES)])
     return result
+
+
+@lru_cache(maxsize=16)
+def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
+    """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free.
+
+    The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.
+    """
+    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
+    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
+    parameters, dof = ca.SX.sym("parameters", len(model.parameters)), model.num_dof
+    tau = ca.SX.sym("tau", dof)
+    total = tau
+    for term in model.sums:
+        for entry in () if term.arrays is None else term.arrays:
+            total = total + term.function(*inputs, parameters, entry)
+    acceleration = model.rates(*inputs, parameters, total)[dof : 2 * dof]
+    mass = ca.inv(ca.densify(ca.jacobian(acceleration, tau)))
+    force = mass @ ca.substitute(acceleration, tau, ca.SX.zeros(dof))
+    theta = ca.vertcat(*(parameters[i] for i in free))
+    result = [
+        force,
+        ca.densify(ca.jacobian(force, theta)),
+        ca.densify(mass),
+        ca.densify(ca.jacobian(ca.vec(mass), theta)),
+    ]
+    return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
 
 
 def _hull_forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], zero: bool) -> tuple[Array, Array]:

@@ -24,6 +24,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
 from shipid.identification.bands import Trial, band_refusal, check_level, measure_bands, perform_trials
+from shipid.identification.fit import Solution
 from shipid.identification.free_run import ALL, ERRORS_OF, FreeRuns, check_length, simulate_free_runs
 from shipid.identification.outcome import (
     TRIED,
@@ -34,7 +35,6 @@ from shipid.identification.outcome import (
 )
 from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure

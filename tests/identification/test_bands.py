@@ -11,8 +11,8 @@ from scipy import stats
 
 from shipid.errors import DataError, ShipidError
 from shipid.identification.bands import Perform, band_refusal, measure_bands, principal_axes
+from shipid.identification.fit import Solution
 from shipid.identification.outcome import run_identification
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import Statistics, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel

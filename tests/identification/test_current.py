@@ -9,9 +9,9 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification import solve
+from shipid.identification.fit import Solution
 from shipid.identification.outcome import _next_manoeuvres, run_identification
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import fit_statistics
 from shipid.vessel.load import Vessel, load_vessel

@@ -21,6 +21,7 @@ from shipid.identification import outcome
 from shipid.identification.bands import residual_spacing
 from shipid.identification.design import Candidate, InformedCandidate, candidate_manoeuvres
 from shipid.identification.diagnosis import diagnose
+from shipid.identification.fit import Solution
 from shipid.identification.free_run import ALL, simulate_free_runs
 from shipid.identification.outcome import (
     AFTER,
@@ -32,7 +33,6 @@ from shipid.identification.outcome import (
     write_patch,
 )
 from shipid.identification.settings import Identify, free_factors
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import fit_statistics
 from shipid.vessel.load import Vessel, load_vessel

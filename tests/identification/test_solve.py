@@ -12,10 +12,9 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.identification.fit import initial_point, search_factors
+from shipid.identification.fit import Solution, initial_point, search_factors
 from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import fit_statistics
 from shipid.simulation.manoeuvre import Zigzag

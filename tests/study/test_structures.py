@@ -13,9 +13,9 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
+from shipid.identification.fit import Solution
 from shipid.identification.outcome import COMPARED
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.structures import exchange_structure
 from shipid.report.structures import write_structures
