@@ -60,22 +60,23 @@ def collinear_sets(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, 
     silent = np.flatnonzero(lengths <= UNSEEN * lengths.max(initial=0.0)).tolist()
     names = short_names(paths)
     result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
-    gram = _scaled_gram(jacobian)
-    left = [j for j in range(len(paths)) if j not in silent]
-    while len(left) > 1 and _collinearity_index(gram, left) > MOST_COLLINEAR:
+    scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
+    gram, left = np.asarray(scaled.T @ scaled), [j for j in range(len(paths)) if j not in silent]
+    while len(left) > 1 and _collinearity_index(gram, left)[0] > MOST_COLLINEAR:
         chosen = _shrink_set(gram, left)
-        weights = _weakest_direction(gram, chosen) / lengths[chosen]
+        gamma, direction = _collinearity_index(gram, chosen)
+        weights = direction / lengths[chosen]
         weights = weights / weights[np.argmax(np.abs(weights))]
         labels = tuple(paths[j] for j in chosen), tuple(names[j] for j in chosen)
-        result.append(Combination(*labels, tuple(map(float, weights)), _collinearity_index(gram, chosen)))
-        left.remove(chosen[int(np.argmax(np.abs(_weakest_direction(gram, chosen))))])
+        result.append(Combination(*labels, tuple(map(float, weights)), gamma))
+        left.remove(chosen[int(np.argmax(np.abs(direction)))])
     return tuple(result)
 
 
 def _shrink_set(gram: Array, members: list[int]) -> list[int]:
     while len(members) > 2:
         without = [[smaller for smaller in members if smaller != gone] for gone in members]
-        gammas = [_collinearity_index(gram, smaller) for smaller in without]
+        gammas = [_collinearity_index(gram, smaller)[0] for smaller in without]
         best = int(np.argmax(gammas))
         if gammas[best] <= MOST_COLLINEAR:
             break
@@ -83,21 +84,10 @@ def _shrink_set(gram: Array, members: list[int]) -> list[int]:
     return members
 
 
-def _collinearity_index(gram: Array, members: list[int]) -> float:
-    smallest = float(np.linalg.eigvalsh(gram[np.ix_(members, members)])[0])
-    return float(1 / np.sqrt(max(smallest, UNSEEN)))
-
-
-def _weakest_direction(gram: Array, members: list[int]) -> Array:
-    """Unit vector of the smallest eigenvalue of the scaled Gram matrix: the direction with the least effect."""
-    return np.asarray(np.linalg.eigh(gram[np.ix_(members, members)])[1][:, 0])
-
-
-def _scaled_gram(jacobian: Array) -> Array:
-    """Gram matrix of the columns scaled to unit length; zero columns stay 0."""
-    lengths = np.sqrt((jacobian**2).sum(axis=0))
-    scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
-    return np.asarray(scaled.T @ scaled)
+def _collinearity_index(gram: Array, members: list[int]) -> tuple[float, Array]:
+    """The index, and the unit vector of the smallest eigenvalue of the scaled Gram matrix, of the least effect."""
+    values, vectors = np.linalg.eigh(gram[np.ix_(members, members)])
+    return float(1 / np.sqrt(max(float(values[0]), UNSEEN))), np.asarray(vectors[:, 0])
 
 
 def invert_information(information: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -53,12 +53,13 @@ class Point:
 class Result:
     """Result of one search.
 
-    factors : (n,). at : the prediction with these factors. objective : sum of squares with priors; inf if it diverges.
-    iterations : of the trust region. status : `ok`, `not converged`, `diverged` or `stopped`.
+    factors : (n,). at, point : prediction and unknowns of the runs with these factors. objective : sum of squares with
+    priors; inf if it diverges. iterations : of the trust region. status : `ok`, `not converged`, `diverged`, `stopped`.
     """
 
     factors: Array
     at: ResidualPrediction
+    point: Point
     objective: float
     iterations: int
     status: str
@@ -147,12 +148,13 @@ def search_factors(
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
         start = evaluate_factors(problem, begin, best_valley(problem, begin, point) or point)
         if not np.isfinite(start.objective):
-            return Result(begin, start.at, float("inf"), before, "diverged")
+            return Result(begin, start.at, start.point, float("inf"), before, "diverged")
         run = _SearchState(problem, start, progress, held, before)
         word, at_bound = run.minimise(tolerance, most), run.pushed()
         if word == "ok" and at_bound.any():
             word = run.settle(at_bound, tolerance, most)
-    return Result(run.best.factors, run.best.at, run.best.objective, run.iterations, word)
+    best = run.best
+    return Result(best.factors, best.at, best.point, best.objective, run.iterations, word)
 
 
 def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:

@@ -94,10 +94,7 @@ def simulate_free_runs(
     frames = list[pd.DataFrame]()
     for name, vessel in vessels.items():
         sea, known = with_current(vessel, settings, runs, (currents or {}).get(name, (0.0, 0.0)))
-        own = run_overrides(known, runs)
-        overrides = resolve_overrides(
-            known.model_copy(update={"runs": own}), runs, sea, vessel_dynamics(sea).environment
-        )
+        overrides = resolve_overrides(known, runs, sea, vessel_dynamics(sea).environment, dataset.runs)
         pieces = cut_segments(
             sea, dataset, runs, settings.step, length, overrides=overrides, commands=settings.commands
         )

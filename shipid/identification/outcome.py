@@ -130,7 +130,7 @@ class Identification(IdentificationContent):
             base_digest=digest,
             source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
             values=changed | dict(solution.values),
-            provenance=_as_toml_value(self._provenance()),
+            provenance=documents.plain_values(self._provenance()),
             unusual=tuple(_unusual_numbers(vessel.with_values(solution.values))),
         )
 
@@ -157,7 +157,7 @@ class Identification(IdentificationContent):
                 f"{row['set']} {row['model']}": {name: _round_significant(row[name]) for name in ERRORS_OF}
                 for row in free
             },
-            "settings": solution.settings.model_dump(),
+            "settings": solution.settings.model_dump(exclude_none=True),
         }
 
 
@@ -274,14 +274,12 @@ def run_identification(
         identified = vessel.with_values(solution.values)
         pair, flows = {BEFORE: vessel, AFTER: identified}, {AFTER: solution.common_current}
         free = {name: simulate_free_runs(pair, dataset, each, settings, ahead, flows) for name, each in sets.items()}
-        _go_on(held)
         manoeuvres, logs = _compare_manoeuvres(pair)
         refused = "" if band is None else band_refusal(solution, judged)
         if band is not None and not refused:
             ends = measure_bands(vessel, solution, judged, _compared_measures, band)
             ends = ends[["manoeuvre", "measure", "low", "high"]]
             manoeuvres = manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"])
-        _go_on(held)
         curved = curvature_warning(solution, dataset, judged, determined)
         _go_on(held)
         outputs = _compare_outputs(pair, solution, dataset, fitted)
@@ -729,12 +727,3 @@ def _worse_signals(errors: pd.DataFrame) -> list[str]:
 def _round_significant(value: float) -> float:
     """Round to 6 significant digits, so that the text does not depend on the machine."""
     return float(f"{value:.6g}")
-
-
-def _as_toml_value(value: Any) -> Any:
-    """Convert a value for TOML: None entries are removed, tuples become lists."""
-    if isinstance(value, Mapping):
-        return {str(key): _as_toml_value(item) for key, item in value.items() if item is not None}
-    if isinstance(value, list | tuple):
-        return [_as_toml_value(item) for item in value]
-    return value

@@ -35,7 +35,7 @@ class Profile:
     """Profile of one factor.
 
     values, rises : factors held and (C - C_min) / s^2, rising in values. limit : t^2.
-    low, high : 95 % interval; -inf or inf on a side that is open. failed : refits that gave no finite objective.
+    low, high : 95 % interval; -inf or inf on a side that is open.
     sentence : the interval in words, with what is open.
     """
 
@@ -45,7 +45,6 @@ class Profile:
     limit: float
     low: float
     high: float
-    failed: int
     sentence: str
 
 
@@ -59,14 +58,18 @@ def profile_table(curve: Profile) -> pd.DataFrame:
 class _Curve:
     """Points of a profile so far.
 
-    points : value of the factor -> objective and factors (n,) of its refit. failed : values whose refit failed.
+    points : value of the factor -> objective, infinite where the refit failed, and factors (n,) of its refit.
     """
 
     path: str
     refit: Refit
     ratio: float
     points: dict[float, tuple[float, Array]] = field(default_factory=dict)
-    failed: set[float] = field(default_factory=set)
+
+    @property
+    def sound(self) -> list[float]:
+        """Values whose refit succeeded, rising."""
+        return sorted(value for value, (objective, _) in self.points.items() if np.isfinite(objective))
 
     @property
     def least(self) -> float:
@@ -77,16 +80,10 @@ class _Curve:
 
         The refit begins at the factors of the nearest known point.
         """
-        if value in self.failed:
-            return float("inf")
         if value not in self.points:
-            nearest = min(self.points, key=lambda known: abs(known - value))
-            start = self.points[nearest][1]
+            start = self.points[min(self.sound, key=lambda known: abs(known - value))][1]
             objective, factors = self.refit(self.path, value, start)
-            if not np.isfinite(objective):
-                self.failed.add(value)
-                return float("inf")
-            self.points[value] = objective, factors
+            self.points[value] = objective if np.isfinite(objective) else float("inf"), factors
         return max((self.points[value][0] - self.least) / self.ratio, 0.0)
 
 
@@ -121,15 +118,15 @@ def profile_factor(
         for side, bound in ((-1, bounds[0]), (1, bounds[1])):
             farthest = bound if np.isfinite(bound) else centre + side * far
             ends[side] = _profile_crossing(curve, centre, side, step, limit, farthest)
-    values = np.array(sorted(curve.points))
+    values = np.array(curve.sound)
     rises = np.array([curve.rise(value) for value in values])
     best = float(values[np.argmin(rises)])
     moved = (objective - curve.least) / ratio > 0.01 * limit
     tried = tuple(f"{value:.4g}{' (its bound)' * (value in bounds)}" for value in (values[0], values[-1]))
     sentence = _profile_sentence(path, unit, ends[-1], ends[1], tried, best if moved else None)
-    if curve.failed:
-        sentence += f"; {len(curve.failed)} refits failed and count as outside"
-    return Profile(path, values, rises, limit, ends[-1], ends[1], len(curve.failed), sentence)
+    failed = len(curve.points) - len(values)
+    sentence += f"; {failed} refits failed and count as outside" if failed else ""
+    return Profile(path, values, rises, limit, ends[-1], ends[1], sentence)
 
 
 def _profile_crossing(curve: _Curve, estimate: float, side: int, step: float, limit: float, farthest: float) -> float:

@@ -212,17 +212,6 @@ def _check_set_for_a_run(
             raise DocumentError(message, path=f"{BLOCK}.runs.{run}.{path}")
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """Output of the engine for S predictions of N steps.
-
-    r : (S, N ny) weighted residuals. R : (S, N ny, nc) their derivatives to initial state, factors and nuisances.
-    """
-
-    r: Array
-    R: Array
-
-
 class Predictions:
     """All S predictions of a fit as arrays for the engine; shorter predictions are padded with weight 0.
 
@@ -305,8 +294,10 @@ class Predictions:
             slope[:, :states] = slopes.reshape(states, count, -1).transpose(1, 0, 2)
         return np.hstack([nodes, self.log[:, entries:]]), slope
 
-    def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> Evaluation:
-        """Run all predictions; those that diverge give residuals that are not finite.
+    def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> tuple[Array, Array]:
+        """Weighted residuals (S, N ny) of all predictions; where one diverges they are not finite.
+
+        And their derivatives (S, N ny, nc) to initial state, factors and nuisances.
 
         nodes : (S, nn) initial states. factors : (n,). nuisances : (R, nq) [SI].
         """
@@ -327,7 +318,7 @@ class Predictions:
             record = self._run(x, fixed)
         r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
         R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).swapaxes(3, 4)
-        return Evaluation(r, R.reshape(-1, r.shape[1], R.shape[4])[:count])
+        return r, R.reshape(-1, r.shape[1], R.shape[4])[:count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -440,11 +431,11 @@ def predict_residuals(
         away = np.zeros_like(measured)
     if away.size:
         begun = measured + width * problem.node_scale * away
-    evaluation = whole.evaluate(begun, factors, q)
+    r, slopes = whole.evaluate(begun, factors, q)
     num_nodes, n, num_signals = len(problem.model.node), len(problem.layout.groups), len(problem.layout.signals)
     keep = (whole.weight > 0).reshape(len(whole), -1)
     where, place = np.nonzero(keep)
-    R = evaluation.R[keep]  # (m, nc)
+    R = slopes[keep]  # (m, nc)
     by_q, by_start = R[:, num_nodes + n :], R[:, :num_nodes]
     if by_q.size:
         with np.errstate(all="ignore"):
@@ -454,7 +445,7 @@ def predict_residuals(
         factors=factors,
         nuisances=nuisances,
         away=away,
-        r=evaluation.r[keep],
+        r=r[keep],
         by_factor=np.hstack([R[:, num_nodes : num_nodes + n], problem.common_width * by_q[:, problem.common]]),
         by_nuisance=by_q * problem.widths,
         by_start=by_start * (problem.node_scale * width) if away.size else by_start[:, :0],

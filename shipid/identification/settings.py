@@ -136,10 +136,10 @@ class Identify(CheckedModel, BaseModel):
         if unknown is not None:
             raise ValueError(f"nuisance.{unknown} is no valid name: {suggest_name(unknown, NUISANCES)}")
         for path, (low, high) in self.bounds.items():
-            if math.isnan(low) or math.isnan(high):
-                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] lacks a number: give [low, high], or inf")
-            if low > high:
-                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] has low above high: give [low, high]")
+            if not low <= high:
+                raise ValueError(
+                    f"bounds.{path}: [{low:g}, {high:g}] are no two rising numbers: give [low, high], or inf"
+                )
         if self.commands == "between" and self.outputs:
             message = "'between' is not for measured outputs, which belong to the command of their row"
             raise ValueError(f"commands: {message}: leave weights.{self.outputs[0]} out, or write 'held'")
@@ -279,11 +279,9 @@ def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
     key = _VesselKey(vessel.digest, vessel)
     low = np.array([max(_smallest_factor(key, path) for path in group) for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
-    if settings.ranges:
-        for i, group in enumerate(groups):
-            for path in group:
-                least, most = plausible_factors(vessel, path)
-                low[i], high[i] = max(low[i], least), min(high[i], most)
+    for path, i in place.items() if settings.ranges else ():
+        least, most = plausible_factors(vessel, path)
+        low[i], high[i] = max(low[i], least), min(high[i], most)
     for pattern, limits in settings.bounds.items():
         for path in reached(pattern, "bounds", place):
             low[place[path]], high[place[path]] = limits  # as the user says, also below 0

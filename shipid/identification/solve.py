@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
-from shipid.identification.collinearity import invert_information
 from shipid.identification.diagnosis import diagnose, fit_forces
 from shipid.identification.fit import (
     BEGIN,
@@ -37,7 +36,7 @@ from shipid.identification.settings import (
     run_overrides,
     weighted_columns,
 )
-from shipid.identification.statistics import Basis, residual_whiteness
+from shipid.identification.statistics import Basis, residual_whiteness, restrict_fit
 from shipid.units import percent_text, significant_digits
 from shipid.vessel.load import Vessel
 
@@ -217,7 +216,7 @@ def _fit_dropping_factors(
         problem = _hold_factor(problem, weakest, targets[weakest])
         dropped = (*solution.dropped, problem.unknown.paths[weakest])
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
-        result = search_factors(problem, factors, _result_point(result), progress, before=result.iterations)
+        result = search_factors(problem, factors, result.point, progress, before=result.iterations)
         solution = replace(
             _build_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped
         )
@@ -242,7 +241,7 @@ def _search_from_starts(
             begin, before, stopped = grow_horizon(problem, dataset, factors, progress, before)
             if stopped:
                 value = evaluate_factors(problem, begin, point)
-                return Result(begin, value.at, value.objective, before, "stopped"), objective_start
+                return Result(begin, value.at, value.point, value.objective, before, "stopped"), objective_start
         elif way == "inverse":
             try:
                 begin = by_inverse_dynamics(problem, dataset)
@@ -285,31 +284,21 @@ def _step_warning(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
 
 
 def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | None) -> tuple[Array, Point]:
-    """Initial factors within the bounds, and where nuisances and initial states begin."""
-    if not isinstance(start, Solution):
-        return _initial_factors(problem, start or {}), initial_point(problem)
-    begin = zip(start.paths, start.factors.tolist(), strict=True)
-    gone = NUISANCES["current"].keys() - set(problem.unknown.paths)  # the other fit may have chosen a current
-    factors = _initial_factors(problem, {path: factor for path, factor in begin if path not in gone})
-    one, other = start.point, initial_point(problem)
-    alike = one.nuisances.shape == other.nuisances.shape and one.away.shape == other.away.shape
-    return factors, one if alike else other
-
-
-def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
-    """Initial factors (n,) within the bounds: those in `start`, the others of the base vessel."""
-    unknown = problem.unknown
+    """Initial factors (n,) within the bounds, those in `start` or of the base, and where the unknowns of runs begin."""
+    unknown, point = problem.unknown, initial_point(problem)
+    if isinstance(start, Solution):
+        gone = NUISANCES["current"].keys() - set(unknown.paths)  # the other fit may have chosen a current
+        one, begin = start.point, zip(start.paths, start.factors.tolist(), strict=True)
+        start = {path: factor for path, factor in begin if path not in gone}
+        alike = one.nuisances.shape == point.nuisances.shape and one.away.shape == point.away.shape
+        point = one if alike else point
     factors = unknown.centre + np.array([BEGIN.get(path, 0.0) for path in unknown.paths])
-    for path, factor in start.items():
+    for path, factor in (start or {}).items():
         if path not in unknown.paths:
             message = f"{path!r} is not free in the fit: {suggest_name(path, unknown.paths)}"
             raise DocumentError(message, path=f"{BLOCK}.start")
         factors[unknown.paths.index(path)] = float(as_float_array(f"start of {path}", factor, DocumentError))
-    return np.asarray(np.clip(factors, unknown.low, unknown.high))
-
-
-def _result_point(result: Result) -> Point:
-    return Point(result.at.nuisances, result.at.away)
+    return np.asarray(np.clip(factors, unknown.low, unknown.high)), point
 
 
 def _build_solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
@@ -350,7 +339,7 @@ def _build_solution(problem: Problem, result: Result, objective_start: float, se
             (scales[0], problem.vessel.units.get(path, "m/s"))
             for path, scales in zip(unknown.paths, unknown.scale, strict=True)
         ),
-        point=_result_point(result),
+        point=result.point,
         within=end.within(settings.linear_from),
     )
 
@@ -384,16 +373,16 @@ def _search_sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool
 
 def _weakest_factor(solution: Solution, threshold: float, targets: Array) -> int | None:
     """Index of the free factor with the smallest |factor - target| / standard error; None if above the threshold."""
-    information = solution.jacobian.T @ solution.jacobian + np.diag(1 / solution.prior_widths**2)
-    free = ~solution.held
-    if not free.any():
+    free = np.flatnonzero(~solution.held)
+    if not len(free):
         return None
-    level = (solution.residuals**2).sum() / max(1, len(solution.residuals) - free.sum())
-    inverse, unseen = invert_information(information[np.ix_(free, free)])
-    errors = np.where(unseen, np.inf, np.sqrt(np.diag(inverse) * level))
+    inner = restrict_fit(solution, free)
+    basis = Basis.of(inner)
+    level = (inner.residuals**2).sum() / max(1, len(inner.residuals) - len(free))
+    errors = np.where(basis.unseen, np.inf, np.sqrt(np.diag(basis.inverse) * level))
     away = np.abs(solution.factors - targets)[free] / np.maximum(errors, 1e-300)
     weakest = int(np.argmin(away))
-    return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None
+    return int(free[weakest]) if away[weakest] < threshold else None
 
 
 def _hold_factor(problem: Problem, number: int, target: float) -> Problem:

@@ -212,7 +212,7 @@ def fit_statistics(fit: LinearFit) -> Statistics:
         raise ShipidError(
             f"{len(fit.residuals)} residuals are too few to estimate the errors of {n} parameters: use more data"
         )
-    inner = _restrict_fit(fit, free)
+    inner = restrict_fit(fit, free)
     basis = Basis.of(inner)
     colours = residual_whiteness(inner, basis)
     covariances = _covariance_forms(inner, basis, colours)
@@ -263,7 +263,7 @@ def _no_estimate_reason(fit: LinearFit) -> str:
     return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
 
 
-def _restrict_fit(fit: LinearFit, free: NDArray[np.intp]) -> LinearFit:
+def restrict_fit(fit: LinearFit, free: NDArray[np.intp]) -> LinearFit:
     """The fit of some of its factors."""
     of_factor = {name: getattr(fit, name)[free] for name in ("factors", "prior_widths", "at_bound", "held", "centre")}
     paths, sizes = tuple(fit.paths[j] for j in free), tuple(fit.sizes[j] for j in free)

@@ -110,11 +110,11 @@ class HullExchange:
 
 def check_structures(names: Sequence[str]) -> None:
     """Raise ShipidError for an unknown structure, or for one that is named twice."""
-    valid = (PRESENT, *STRUCTURES)
-    for number, name in enumerate(names):
-        if name not in valid:
-            raise ShipidError(f"{name!r} is no structure: {suggest_name(name, valid)}", path="structures")
-        if name in names[:number]:
+    for name in names:
+        if name not in (PRESENT, *STRUCTURES):
+            hint = suggest_name(name, (PRESENT, *STRUCTURES))
+            raise ShipidError(f"{name!r} is no structure: {hint}", path="structures")
+        if names.count(name) > 1:
             raise ShipidError(f"{name!r} is named twice", path="structures")
 
 
@@ -220,7 +220,7 @@ def _sample_states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dic
 
 @lru_cache(maxsize=16)
 def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
-    """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free.
+    """(state, memory, commands, environment, parameters) -> F, dF/d free.
 
     The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.
     """
@@ -236,12 +236,7 @@ def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
     mass = ca.inv(ca.densify(ca.jacobian(acceleration, tau)))
     force = mass @ ca.substitute(acceleration, tau, ca.SX.zeros(dof))
     theta = ca.vertcat(*(parameters[i] for i in free))
-    result = [
-        force,
-        ca.densify(ca.jacobian(force, theta)),
-        ca.densify(mass),
-        ca.densify(ca.jacobian(ca.vec(mass), theta)),
-    ]
+    result = [force, ca.densify(ca.jacobian(force, theta))]
     return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
 
 
@@ -260,7 +255,7 @@ def _hull_forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str
         for group in ((*model.state, *model.hidden), tuple(model.memory), model.commands, model.environment)
     ]
     mapped = function.map("forces", "serial", count, [function.n_in() - 1], [])
-    force, slopes, *_ = mapped(*inputs, values)
+    force, slopes = mapped(*inputs, values)
     rows = [model.state[model.num_dof :].index(name) for name in ("u", "v", "r")]
     by_free = np.array(slopes).reshape(model.num_dof, count, len(free))
     return np.array(force)[rows], by_free[rows]
