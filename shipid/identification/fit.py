@@ -108,15 +108,11 @@ class Solution(LinearFit):
         return self.vessel.with_values(self.values)
 
 
-def huber_loss(r: Array, threshold: float) -> tuple[Array, Array]:
-    """Huber loss of whitened residuals r: contribution of each to the objective, and its weight.
-
-    r^2 with weight 1 up to the threshold; linear beyond it, with weight threshold / |r|.
-    """
+def huber_loss(r: Array, threshold: float) -> Array:
+    """Huber loss of whitened residuals r: r^2 up to the threshold, linear beyond it."""
     size = np.abs(r)
-    inside = size <= threshold
     with np.errstate(all="ignore"):
-        return np.where(inside, r**2, 2 * threshold * size - threshold**2), np.where(inside, 1.0, threshold / size)
+        return np.where(size <= threshold, r**2, 2 * threshold * size - threshold**2)
 
 
 def initial_point(problem: Problem) -> Point:
@@ -427,7 +423,7 @@ def _robust_residuals(at: ResidualPrediction, threshold: float) -> tuple[Array, 
     """Residuals (m,) whose squares are the loss, their Jacobian (m, n), and the weight (m,) of any other derivative."""
     if not np.isfinite(threshold):
         return at.r, at.by_factor, np.ones(len(at.r))
-    f = np.sign(at.r) * np.sqrt(huber_loss(at.r, threshold)[0])
+    f = np.sign(at.r) * np.sqrt(huber_loss(at.r, threshold))
     slope = np.where(np.abs(at.r) <= threshold, 1.0, threshold / np.maximum(np.abs(f), threshold))
     return f, slope[:, None] * at.by_factor, slope
 
@@ -464,7 +460,7 @@ def _eliminate_run_unknowns(problem: Problem, factors: Array, point: Point) -> R
 
 def _run_objectives(problem: Problem, at: ResidualPrediction, threshold: float) -> Array:
     """Objective (R,) of each run, without the priors of the factors."""
-    total = np.bincount(at.run, huber_loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
+    total = np.bincount(at.run, huber_loss(at.r, threshold), len(problem.runs)) + (at.nuisances**2).sum(axis=1)
     if at.away.size:
         total += np.bincount(problem.whole.run, (at.away**2).sum(axis=1), len(problem.runs))
     return np.asarray(total)

@@ -99,7 +99,8 @@ def simulate_free_runs(
             sea, dataset, runs, settings.step, length, overrides=overrides, commands=settings.commands
         )
         if not frames:
-            frames = [_state_series(runs, pieces, MEASURED, [_log_states(piece) for piece in pieces])]
+            log = [np.array([_log_column(piece, channel) for channel in CHANNELS]).T for piece in pieces]
+            frames = [_state_series(runs, pieces, MEASURED, log)]
         frames.append(_state_series(runs, pieces, name, _predict_pieces(sea, runs, pieces, overrides, settings)))
     series = pd.concat(frames, ignore_index=True)
     return FreeRuns(series.drop(columns="measured"), _series_errors(series))
@@ -160,10 +161,6 @@ def _predict_alike(
 def _log_column(piece: ShootingSegment, name: str) -> Array:
     """Measured values (N + 1,) of a state or an input; 0 where there are none."""
     return piece.columns.get(state_column(name), np.zeros(piece.num_steps + 1))
-
-
-def _log_states(piece: ShootingSegment) -> Array:
-    return np.array([_log_column(piece, name) for name in CHANNELS]).T
 
 
 def _state_series(

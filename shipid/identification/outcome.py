@@ -28,12 +28,14 @@ from shipid.identification.bands import (
     Trial,
     band_refusal,
     check_level,
+    data_reach,
+    extrapolation_sentence,
     measure_bands,
     memory_of_signals,
+    of_log,
     perform_trials,
     residual_spacing,
 )
-from shipid.identification.curvature import curvature_warning
 from shipid.identification.fit import Progress, Solution
 from shipid.identification.free_run import (
     ALL,
@@ -45,8 +47,7 @@ from shipid.identification.free_run import (
     with_current,
 )
 from shipid.identification.plausible import implausibility
-from shipid.identification.profile import Profile, profile_factor, profile_table, variance_ratio
-from shipid.identification.reach import data_reach, extrapolation_sentence, of_log
+from shipid.identification.profile import Profile, curvature_warning, profile_factor, profile_table, variance_ratio
 from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
 from shipid.identification.solve import identify
 from shipid.identification.statistics import (

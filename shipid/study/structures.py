@@ -23,7 +23,17 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
-from shipid.identification.bands import Trial, band_refusal, check_level, measure_bands, perform_trials
+from shipid.identification.bands import (
+    Reach,
+    Trial,
+    band_refusal,
+    check_level,
+    data_reach,
+    extrapolation_sentence,
+    measure_bands,
+    of_log,
+    perform_trials,
+)
 from shipid.identification.fit import Solution
 from shipid.identification.free_run import ALL, ERRORS_OF, FreeRuns, check_length, simulate_free_runs
 from shipid.identification.outcome import (
@@ -33,7 +43,6 @@ from shipid.identification.outcome import (
     warn_of_unmeasured_inputs,
     without_shared,
 )
-from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, Statistics, fit_statistics

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from shipid.identification.curvature import MOST, Beside, curvature_sentence, curvature_warning, interval_end_ratios
 from shipid.identification.fit import local_linearisation
+from shipid.identification.profile import MOST, Beside, curvature_sentence, curvature_warning, interval_end_ratios
 from shipid.identification.residuals import build_problem
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
