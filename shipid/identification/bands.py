@@ -55,6 +55,17 @@ def perform_trials(vessel: Vessel, trials: Mapping[str, Trial]) -> tuple[dict[st
     return done, refused
 
 
+def select_measures(
+    vessel: Vessel, trials: Mapping[str, Trial], shown: Mapping[str, Sequence[str]]
+) -> dict[str, dict[str, float]]:
+    """Title of each trial that the vessel can perform -> measure -> value. shown : kind of a trial -> measures."""
+    done, _ = perform_trials(vessel, trials)
+    rows = {
+        title: [row for row in one.measures if row["measure"] in shown[trials[title][0]]] for title, one in done.items()
+    }
+    return {title: {row["measure"]: float(row["value"]) for row in measures} for title, measures in rows.items()}
+
+
 def check_level(level: float | None) -> None:
     """Raise DataError for a level that is not between 0 and 1."""
     if level is not None and not (isinstance(level, int | float | np.number) and 0 < level < 1):

@@ -1,7 +1,7 @@
 """What is wrong where a vessel and a log disagree: every cause is a nuisance of one fit, and all of them are compared.
 
 **The fit.** Equations of motion and of kinematics are multiplied by a bump phi(t) that moves along the runs, and
-integrated by parts (the weak form of `shipid.identification.inverse`): nothing is differentiated, nothing diverges.
+integrated by parts (weak form: Messenger, Bortz, JCP 443 (2021) 110525): nothing is differentiated, nothing diverges.
 Each bump gives six residuals, measured change less predicted change: of u, v, r by the physics, of heading by the yaw
 rate, of position along and across by heading and velocities. A cause is a change of the log (commands, sensors), of
 the water or of the numbers of the vessel; it is fitted alone by Gauss-Newton from the same start.

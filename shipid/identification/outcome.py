@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,6 +36,7 @@ from shipid.identification.bands import (
     of_log,
     perform_trials,
     residual_spacing,
+    select_measures,
 )
 from shipid.identification.fit import Progress, Solution
 from shipid.identification.free_run import (
@@ -48,7 +50,14 @@ from shipid.identification.free_run import (
 )
 from shipid.identification.plausible import implausibility
 from shipid.identification.profile import Profile, curvature_warning, profile_factor, profile_table, variance_ratio
-from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
+from shipid.identification.settings import (
+    BLOCK,
+    Identify,
+    free_factors,
+    resolve_overrides,
+    run_overrides,
+    weighted_columns,
+)
 from shipid.identification.solve import identify
 from shipid.identification.statistics import (
     Statistics,
@@ -278,7 +287,8 @@ def run_identification(
         manoeuvres, logs = _compare_manoeuvres(pair)
         refused = "" if band is None else band_refusal(solution, judged)
         if band is not None and not refused:
-            ends = measure_bands(vessel, solution, judged, _compared_measures, band)
+            perform = partial(select_measures, trials=_standard_trials(), shown=COMPARED)
+            ends = measure_bands(vessel, solution, judged, perform, band)
             ends = ends[["manoeuvre", "measure", "low", "high"]]
             manoeuvres = manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"])
         curved = curvature_warning(solution, dataset, judged, determined)
@@ -513,16 +523,6 @@ def _standard_trials() -> dict[str, Trial]:
     return {title: (kind, angles, "starboard") for title, (kind, angles) in zip(titles, TRIED, strict=True)}
 
 
-def _compared_measures(vessel: Vessel) -> dict[str, dict[str, float]]:
-    """Title -> measure -> value of the standard manoeuvres that a vessel can perform."""
-    return {
-        title: {
-            row["measure"]: float(row["value"]) for row in one.measures if row["measure"] in COMPARED[one.standard.kind]
-        }
-        for title, one in perform_trials(vessel, _standard_trials())[0].items()
-    }
-
-
 def _longest_run(solution: Solution) -> float:
     each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
     return max(float(np.ptp(times)) for times in each)
@@ -544,7 +544,8 @@ def _next_manoeuvres(
     unknown, settings = free_factors(solution.vessel, solution.settings), solution.settings
     own = sum(path in vessel.parameters for path in unknown.paths)  # no manoeuvre has the current
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
-    spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
+    levels = {name: judged.whiteness[weighted_columns(name)[0]].level for name in motions}
+    spread = {name: width * (levels[name] or EXACT) for name, width in motions.items()}
     try:
         choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), most)
         settings = settings.model_copy(update={"weights": spread})
@@ -559,12 +560,6 @@ def _next_manoeuvres(
     known = whole[:own, :own] - whole[:own, own:] @ np.linalg.solve(whole[own:, own:], whole[own:, :own])
     table = design.rank_candidates(contributions, unknown.paths[:own], known)
     return table, words if lacking else ""
-
-
-def residual_level(judged: Statistics, signal: str) -> float:
-    """Standard deviation of the residuals of a signal, over the declared one."""
-    columns = {"position": "north"}
-    return judged.whiteness[columns.get(signal, signal)].level
 
 
 def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics) -> Profile:
@@ -624,17 +619,14 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
     return [f"{join_names(held)} {are} the same in all runs to fit: what other orders do there is not learnt"]
 
 
-def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[str]:
-    warnings = []
+def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> Iterator[str]:
     for curve in curves:
         estimate = solution.factors[solution.paths.index(curve.path)]
-        best = curve.values[np.argmin(curve.rises)]
         if curve.rises[np.argmin(np.abs(curve.values - estimate))] > BETTER * curve.limit:
-            warnings.append(
-                f"the estimate is not the optimum: the profile of {curve.path} fits better at {best:.4g}; give "
-                "priors, or another start or horizon"
+            yield (
+                f"the estimate is not the optimum: the profile of {curve.path} fits better at "
+                f"{curve.values[np.argmin(curve.rises)]:.4g}; give priors, or another start or horizon"
             )
-    return warnings
 
 
 def _fit_warnings(

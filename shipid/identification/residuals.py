@@ -232,9 +232,6 @@ class Predictions:
         self.steps = known, seen
         self.packed = (pack_lanes(known), pack_lanes(seen)) if compiled else None
 
-    def __len__(self) -> int:
-        return len(self.run)
-
     def _log(self, segment: ShootingSegment) -> list[float]:
         columns = (segment.columns.get(state_column(name)) for name in self.problem.model.entries)
         values = [0.0 if column is None else float(column[0]) for column in columns]
@@ -285,7 +282,7 @@ class Predictions:
 
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
         """Initial states (S, nn) from the log, and their derivatives (S, nn, nq) to the nuisances (R, nq) [SI]."""
-        model, count = self.problem.model, len(self)
+        model, count = self.problem.model, len(self.run)
         entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
         nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T
         slope = np.zeros((count, len(model.node), q.shape[1]))
@@ -301,7 +298,7 @@ class Predictions:
 
         nodes : (S, nn) initial states. factors : (n,). nuisances : (R, nq) [SI].
         """
-        model, count = self.problem.model, len(self)
+        model, count = self.problem.model, len(self.run)
         num_nodes, num_states = len(model.node), len(model.states)
         num_signals, split = len(self.problem.layout.signals), num_states * (1 + model.num_columns)
         x = np.zeros((count, model.size))
@@ -433,7 +430,7 @@ def predict_residuals(
         begun = measured + width * problem.node_scale * away
     r, slopes = whole.evaluate(begun, factors, q)
     num_nodes, n, num_signals = len(problem.model.node), len(problem.layout.groups), len(problem.layout.signals)
-    keep = (whole.weight > 0).reshape(len(whole), -1)
+    keep = (whole.weight > 0).reshape(len(whole.run), -1)
     where, place = np.nonzero(keep)
     R = slopes[keep]  # (m, nc)
     by_q, by_start = R[:, num_nodes + n :], R[:, :num_nodes]
@@ -451,6 +448,6 @@ def predict_residuals(
         by_start=by_start * (problem.node_scale * width) if away.size else by_start[:, :0],
         segment=where,
         run=whole.run[where],
-        time=np.repeat(whole.time, num_signals, axis=1).reshape(len(whole), -1)[keep],
+        time=np.repeat(whole.time, num_signals, axis=1).reshape(len(whole.run), -1)[keep],
         signals=np.array(problem.layout.signals)[place % num_signals],
     )

@@ -33,6 +33,7 @@ from shipid.identification.bands import (
     measure_bands,
     of_log,
     perform_trials,
+    select_measures,
 )
 from shipid.identification.fit import Solution
 from shipid.identification.free_run import ALL, ERRORS_OF, FreeRuns, check_length, simulate_free_runs
@@ -48,7 +49,6 @@ from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
 from shipid.report.structures import StructuresContent
-from shipid.simulation.measured import MeasuredManoeuvre
 from shipid.study.new import proposed_horizon
 from shipid.study.survey import survey_dataset
 from shipid.version import __version__
@@ -388,25 +388,13 @@ STANDARD_TRIALS: dict[str, Trial] = {
 }
 
 
-def _few_measures(done: Mapping[str, MeasuredManoeuvre]) -> dict[str, dict[str, float]]:
-    """Title -> measure -> value of the measures that are compared."""
-    return {
-        title: {
-            row["measure"]: float(row["value"])
-            for row in one.measures
-            if row["measure"] in MEASURES_SHOWN[one.standard.kind]
-        }
-        for title, one in done.items()
-    }
-
-
 def _manoeuvre_table(
     fits: Mapping[str, FittedStructure], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one extrapolates."""
 
     def perform(vessel: Vessel) -> dict[str, dict[str, float]]:
-        return _few_measures(perform_trials(with_actuators_on(vessel), STANDARD_TRIALS)[0])
+        return select_measures(with_actuators_on(vessel), STANDARD_TRIALS, MEASURES_SHOWN)
 
     rows, far = list[dict[str, Any]](), list[str]()
     for name, fit in fits.items():
@@ -415,9 +403,10 @@ def _manoeuvre_table(
         if name == chosen:
             far += [extrapolation_sentence(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
         frames: list[Any] = [
-            {"manoeuvre": title, "measure": measure, "value": value}
-            for title, values in _few_measures(done).items()
-            for measure, value in values.items()
+            {"manoeuvre": title, **{key: row[key] for key in ("measure", "value")}}
+            for title, one in done.items()
+            for row in one.measures
+            if row["measure"] in MEASURES_SHOWN[one.standard.kind]
         ]
         if level is not None and name in equal:
             frames = measure_bands(fit.solution.vessel, fit.solution, fit.statistics, perform, level).to_dict("records")

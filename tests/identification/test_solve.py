@@ -438,7 +438,7 @@ def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
     ("more", "words"),
     [
         ({"nuisance": ["currant"]}, "did you mean 'current'"),
-        ({"bounds": {FEW[0]: (math.nan, 2.0)}}, r"\[nan, 2\] lacks a number: give \[low, high\]"),
+        ({"bounds": {FEW[0]: (math.nan, 2.0)}}, r"\[nan, 2\] are no two rising numbers: give \[low, high\]"),
         ({"horizon": 1.5}, "must hold two steps"),
         ({"weights": {"u": 0.0}}, "must be above 0"),
         ({"weights": {"u": 0.1, "propeller.thrust": 1e4}, "commands": "between"}, "'between' is not for measured out"),
