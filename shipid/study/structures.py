@@ -399,6 +399,7 @@ def _manoeuvre_table(
     rows, far = list[dict[str, Any]](), list[str]()
     for name, fit in fits.items():
         done, refused = perform_trials(with_actuators_on(fit.vessel), STANDARD_TRIALS)
+        refused = refused if done else {"all": next(iter(refused.values()))}
         units = {row["measure"]: row["unit"] for one in done.values() for row in one.measures}
         if name == chosen:
             far += [extrapolation_sentence(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
