@@ -32,7 +32,6 @@ from shipid.report.selection import PHYSICS_ERRORS
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
     from shipid.engine.rollout import Trajectories
-    from shipid.identification.outcome import Identification
     from shipid.simulation.families import VesselFamily
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
@@ -193,29 +192,27 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
     return _draw("motion-figure", content, [run], dark=dark)
 
 
-def estimates(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def estimates(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Estimates of an identification with 95 % intervals, as factors on the base values."""
     return _draw("estimates", _identification(source), dark=dark)
 
 
-def correlations(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def correlations(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Correlations of the estimates of an identification; needs two of them."""
     return _draw("correlations", _identification(source), dark=dark)
 
 
-def free_runs(
-    source: Identification | IdentificationContent, run: str | None = None, *, dark: bool = False
-) -> go.Figure:
+def free_runs(source: IdentificationContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
     """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
     return _draw("free-runs", _identification(source), [run], dark=dark)
 
 
-def residuals(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def residuals(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Autocorrelation of the residuals of an identification."""
     return _draw("residuals", _identification(source), dark=dark)
 
 
-def profiles(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def profiles(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Profile likelihoods of an identification, of the paths that were asked for."""
     return _draw("profiles", _identification(source), dark=dark)
 
@@ -244,7 +241,8 @@ def _draw(
     lack: str = "the results hold no rows for it",
 ) -> go.Figure:
     """Draw a figure of a page by its id; ShipidError where there is none, with what the source lacks for it."""
-    section = next(one for one in PAGES[type(content)].values() if name in one.items)
+    page = next(page for kind, page in PAGES.items() if isinstance(content, kind))
+    section = next(one for one in page.values() if name in one.items)
     figure = section.draw_item(name, content)
     if not isinstance(figure, PageFigure):
         raise ShipidError(f"there is nothing to draw: {lack}", path="figures")
@@ -273,14 +271,9 @@ def content_of(source: Source) -> ReportContent:
     return report_content(source)
 
 
-def _identification(source: Identification | IdentificationContent) -> IdentificationContent:
-    if isinstance(source, IdentificationContent):
-        return source
-    from shipid.identification.contents import identification_content
-    from shipid.identification.outcome import Identification
-
-    check_class("source", source, Identification, "as of `run_identification`")
-    return identification_content(source, "")
+def _identification(source: IdentificationContent) -> IdentificationContent:
+    check_class("source", source, IdentificationContent, "as of `run_identification`")
+    return source
 
 
 def _manoeuvre(source: MeasuredManoeuvre | ManoeuvreContent) -> ManoeuvreContent:

@@ -24,8 +24,6 @@ ELSEWHERE = {
     },
     "export/fmu_c.py": "export/test_fmu.py",
     "hybrid/deployed.py": "test_predictor.py",
-    "identification/contents.py": "identification/test_command.py",
-    "identification/solution.py": "identification/test_solve.py",
 }
 
 

@@ -148,11 +148,10 @@ def identify_command(
         count = len(outcome.solution.values)
         answer.say(f"{count} {plural_word(count, 'number')} as a patch on {ship.key} -> {file}", file=file)
         if html is not None:
-            from shipid.identification.contents import identification_content
             from shipid.report.identification import write_identification
 
-            content = identification_content(outcome, dataset, command_line())
-            answer.say(f"page -> {write_identification(content, html)}", page=html)
+            page = write_identification(outcome.page(dataset, command_line()), html)
+            answer.say(f"page -> {page}", page=page)
 
 
 @contextmanager
@@ -184,7 +183,7 @@ def _compare_structures(
 ) -> None:
     """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
     from shipid.identification.statistics import LEVEL
-    from shipid.study.structures import compare_structures, structures_content, write_chosen_structure
+    from shipid.study.structures import compare_structures, write_chosen_structure
 
     with end_on_interrupt(), show_steps() as say:
         compared = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)
@@ -194,8 +193,8 @@ def _compare_structures(
     if html is not None:
         from shipid.report.structures import write_structures
 
-        page = structures_content(compared, dataset, command_line())
-        answer.say(f"page -> {write_structures(page, html)}", page=html)
+        page = write_structures(compared.page(dataset, command_line()), html)
+        answer.say(f"page -> {page}", page=page)
 
 
 def _show_structures(compared: StructureComparison, answer: Answer) -> None:
@@ -263,12 +262,12 @@ def _show_identified(outcome: Identification, answer: Answer) -> None:
     if worth:
         words = ", ".join(f"{name} {count:.0f}" for name, count in worth.items())
         answer.say(f"number of independent residuals that they are worth: {words}", independent_residuals=dict(worth))
-    profiles = [curve.sentence for curve in outcome.profiles]
+    profiles = [curve.sentence for curve in outcome.curves]
     answer.say("\n".join(f"profile: {sentence}" for sentence in profiles), profiles=profiles)
-    if outcome.programme is not None:
+    ranked = outcome.programme
+    if len(ranked):
         answer.say("To run next, by information per hour:")
         heads = {"manoeuvre": "manoeuvre", "hours": "h", "gain": "gain [bit]", "per_hour": "bit/h"}
-        ranked = outcome.programme
         answer.records("to_run_next", ranked, heads | {"narrows": "narrows most"}, shown=ranked.head(10))
     answer.warn(outcome.warnings)
 

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.document import short_names
@@ -59,22 +60,23 @@ def collinear_sets(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, 
     silent = np.flatnonzero(lengths <= UNSEEN * lengths.max(initial=0.0)).tolist()
     names = short_names(paths)
     result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
-    gram = _scaled_gram(jacobian)
-    left = [j for j in range(len(paths)) if j not in silent]
-    while len(left) > 1 and _collinearity_index(gram, left) > MOST_COLLINEAR:
+    scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
+    gram, left = np.asarray(scaled.T @ scaled), [j for j in range(len(paths)) if j not in silent]
+    while len(left) > 1 and _collinearity_index(gram, left)[0] > MOST_COLLINEAR:
         chosen = _shrink_set(gram, left)
-        weights = _weakest_direction(gram, chosen) / lengths[chosen]
+        gamma, direction = _collinearity_index(gram, chosen)
+        weights = direction / lengths[chosen]
         weights = weights / weights[np.argmax(np.abs(weights))]
         labels = tuple(paths[j] for j in chosen), tuple(names[j] for j in chosen)
-        result.append(Combination(*labels, tuple(map(float, weights)), _collinearity_index(gram, chosen)))
-        left.remove(chosen[int(np.argmax(np.abs(_weakest_direction(gram, chosen))))])
+        result.append(Combination(*labels, tuple(map(float, weights)), gamma))
+        left.remove(chosen[int(np.argmax(np.abs(direction)))])
     return tuple(result)
 
 
 def _shrink_set(gram: Array, members: list[int]) -> list[int]:
     while len(members) > 2:
         without = [[smaller for smaller in members if smaller != gone] for gone in members]
-        gammas = [_collinearity_index(gram, smaller) for smaller in without]
+        gammas = [_collinearity_index(gram, smaller)[0] for smaller in without]
         best = int(np.argmax(gammas))
         if gammas[best] <= MOST_COLLINEAR:
             break
@@ -82,18 +84,18 @@ def _shrink_set(gram: Array, members: list[int]) -> list[int]:
     return members
 
 
-def _collinearity_index(gram: Array, members: list[int]) -> float:
-    smallest = float(np.linalg.eigvalsh(gram[np.ix_(members, members)])[0])
-    return float(1 / np.sqrt(max(smallest, UNSEEN)))
+def _collinearity_index(gram: Array, members: list[int]) -> tuple[float, Array]:
+    """The index, and the unit vector of the smallest eigenvalue of the scaled Gram matrix, of the least effect."""
+    values, vectors = np.linalg.eigh(gram[np.ix_(members, members)])
+    return float(1 / np.sqrt(max(float(values[0]), UNSEEN))), np.asarray(vectors[:, 0])
 
 
-def _weakest_direction(gram: Array, members: list[int]) -> Array:
-    """Unit vector of the smallest eigenvalue of the scaled Gram matrix: the direction with the least effect."""
-    return np.asarray(np.linalg.eigh(gram[np.ix_(members, members)])[1][:, 0])
-
-
-def _scaled_gram(jacobian: Array) -> Array:
-    """Gram matrix of the columns scaled to unit length; zero columns stay 0."""
-    lengths = np.sqrt((jacobian**2).sum(axis=0))
-    scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
-    return np.asarray(scaled.T @ scaled)
+def invert_information(information: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Pseudo-inverse (n, n) of an information matrix, and a mask (n,) of parameters along its null directions."""
+    scale = np.sqrt(np.diag(information))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    silent = values <= UNSEEN * max(float(values[-1]), UNSEEN)
+    kept = vectors[:, ~silent]
+    inverse = (kept / values[~silent]) @ kept.T / np.outer(scale, scale)
+    return inverse, np.asarray((np.abs(vectors[:, silent]) > np.sqrt(UNSEEN)).any(axis=1))

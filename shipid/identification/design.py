@@ -14,6 +14,7 @@ Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Ver
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +36,7 @@ from shipid.vessel.load import Vessel
 MEASURED_ONCE = 1.0  # standard deviations of the signals: an initial state is known by its row alone
 UNKNOWN = 1.0  # standard deviation of a factor of which nothing is known
 SWING = 0.3  # of the shaft speed: how far it moves in speed runs
+WAVES, FARTHEST_HELM = 20.0, 35.0  # helm angles [deg]: of the multisine, and of any candidate
 RUN = 20.0  # ship lengths at the speed of the approach that a run of excitation takes
 ANGLES: dict[str, tuple[tuple[float, ...], ...]] = {
     "zigzag": ((10.0, 10.0), (20.0, 20.0), (35.0, 20.0)),
@@ -43,16 +45,6 @@ ANGLES: dict[str, tuple[tuple[float, ...], ...]] = {
     "stop": ((),),
 }
 """Standard manoeuvres and angles [deg] that are candidates; spirals are left out, because they take hours."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits of the orders: helm angle [deg], shaft speed [rpm], or force [N], their rates; None: no limit."""
-
-    angle_deg: float = 35.0
-    n_rpm: float = float("inf")
-    angle_rate_deg: float | None = None
-    shaft_rate_rpm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -76,54 +68,46 @@ class InformedCandidate:
     information: Array
 
 
-def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[float, Limits]:
-    """Median speed [m/s] of some runs, and as limits the greatest speed of the shafts that drive the ship ahead."""
+def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[float, float]:
+    """Median speed [m/s] of some runs, and the greatest speed [rpm] or force [N] of what drives the ship ahead."""
     rows = dataset.frame[dataset.frame["run"].isin(list(runs))]
-    shafts = Controls(vessel).effects[0]
-    greatest = [float(rows[name].abs().max()) / drive_scale(name) for name in shafts]
-    limits = Limits(n_rpm=max(greatest) / RPM) if shafts else Limits()
-    return float(np.median(np.hypot(rows["u"], rows["v"]))), limits
+    greatest = [float(rows[name].abs().max()) / drive_scale(name) / RPM for name in Controls(vessel).effects[0]]
+    return float(np.median(np.hypot(rows["u"], rows["v"]))), max(greatest, default=np.inf)
 
 
-def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
-    """Candidate manoeuvres at each approach speed [m/s] that respect the limits; default: Froude numbers 0.1 and 0.2.
+def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float], most: float = np.inf) -> list[Candidate]:
+    """Candidate manoeuvres at each approach speed [m/s] with at most 35 deg of helm and `most` rpm (or N) of the drive.
 
     Zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in steps of the shaft.
     """
-    length = vessel.length
+    length, result = vessel.length, []
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
-    bounds = limits or Limits()
-    asked = [share * FROUDE * float(np.sqrt(GRAVITY * length)) for share in (0.5, 1.0)]
-    result = []
-    for speed in speeds or asked:
+    for speed in speeds:
         for kind, angles in ANGLES.items():
-            for angle in angles:
-                one = define_standard(vessel, kind, angle, speed=speed)
-                result.append(Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre))
-        result += _excitation_candidates(vessel, speed, length, bounds)
-    return [candidate for candidate in result if within_limits(candidate.manoeuvre, bounds)]
+            standard = [define_standard(vessel, kind, angle, speed=speed) for angle in angles]
+            result += [Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre) for one in standard]
+        result += _excitation_candidates(vessel, speed, length, most)
+    return [candidate for candidate in result if within_limits(candidate.manoeuvre, most)]
 
 
-def _excitation_candidates(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
+def _excitation_candidates(vessel: Vessel, speed: float, length: float, most: float) -> Iterator[Candidate]:
     controls, passing = Controls(vessel), length / speed
     n_rpm, unit = shaft_speed(controls, speed) / RPM, controls.drive_unit
-    swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
+    swing = min(SWING * n_rpm, most - n_rpm)
     if swing <= 0:
         return
-    rates = {"angle_rate_deg": limits.angle_rate_deg, "shaft_rate_rpm": limits.shaft_rate_rpm}
-    how: dict[str, Any] = {"n_rpm": n_rpm, "amplitude_rpm": swing, "duration": RUN * passing, **rates}
+    how: dict[str, Any] = {"n_rpm": n_rpm, "amplitude_rpm": swing, "duration": RUN * passing}
     steps = Excitation(signal="aprbs", hold=(2 * passing, 5 * passing), **how)
     yield Candidate(f"speed run, {n_rpm:.3g} +- {swing:.2g} {unit}, {speed:.2g} m/s", steps)
-    angle = min(20.0, limits.angle_deg)
-    waves = Excitation(signal="multisine", angle_deg=angle, period=RUN * passing, harmonics=(1, 12), **how)
-    yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} {unit}, {speed:.2g} m/s", waves)
+    waves = Excitation(signal="multisine", angle_deg=WAVES, period=RUN * passing, harmonics=(1, 12), **how)
+    yield Candidate(f"multisine, {WAVES:g} deg and {swing:.2g} {unit}, {speed:.2g} m/s", waves)
 
 
-def within_limits(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
-    """Whether all orders of a manoeuvre are within the limits of helm and shaft; rates limit excitations only."""
+def within_limits(manoeuvre: ApproachedManoeuvre, most: float) -> bool:
+    """Whether all orders of a manoeuvre are at most 35 deg of helm and `most` rpm of the shaft."""
     helm, shaft = manoeuvre.greatest_orders
-    return shaft <= limits.n_rpm * (1 + 1e-9) and helm <= limits.angle_deg * (1 + 1e-9)
+    return shaft <= most * (1 + 1e-9) and helm <= FARTHEST_HELM * (1 + 1e-9)
 
 
 def information_of_candidates(
@@ -144,8 +128,7 @@ def information_of_candidates(
     unknown = free_factors(vessel, settings)
     factors = unknown.centre if factors is None else factors
     ship = vessel.with_values(unknown.values(factors))
-    step = settings.step / steps_between(ship, settings.step)
-    log = perform_candidates(ship, choice, step=step, interval=settings.step)
+    log = perform_candidates(ship, choice, settings.step)
     rows = log[[name for name in log if not str(name).startswith(ACTUAL)]]
     dataset = Dataset(rows, {"clock": "run", "flags": []})
     problem = build_problem(vessel, dataset, dataset.runs, settings)
@@ -162,42 +145,30 @@ def information_where_possible(
     """As `information_of_candidates`, without the candidates that cannot be simulated; ShipidError where none can."""
     try:
         return information_of_candidates(vessel, choice, *args, **how)
-    except ShipidError as error:
-        if len(choice) < 2:
+    except ShipidError:
+        result = list[InformedCandidate]()
+        for one in choice if len(choice) > 1 else ():
+            with suppress(ShipidError):  # the ship may perform the others
+                result += information_of_candidates(vessel, [one], *args, **how)
+        if not result:
             raise
-        reason = error
-    result = []
-    for one in choice:
-        try:
-            result += information_of_candidates(vessel, [one], *args, **how)
-        except ShipidError as error:  # the ship may perform the others
-            reason = error
-    if not result:
-        raise reason
-    return result
+        return result
 
 
-def perform_candidates(
-    vessel: Vessel,
-    choice: Sequence[Candidate],
-    *,
-    step: float,
-    interval: float | None = None,
-) -> pd.DataFrame:
-    """Log of all candidates, `run` 0000, 0001, ...; by a helmsman's approach where the ship does not go straight."""
+def perform_candidates(vessel: Vessel, choice: Sequence[Candidate], interval: float) -> pd.DataFrame:
+    """Log of all candidates, `run` 0000, 0001, ..., rows `interval` [s] apart, in 40 or more steps per ship length.
+
+    A helmsman approaches where the ship does not go straight.
+    """
+    length = vessel.length or 30.0
+    passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))  # s, at Froude number 0.2
+    step = interval / max(int(np.ceil(40 * interval / passing)), 1)
     named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
     try:
         return perform_manoeuvres(vessel, named, step=step, interval=interval)
     except NotStraight:
         held = [one.model_copy(update={"approach": "helmsman"}) for one in named]
         return perform_manoeuvres(vessel, held, step=step, interval=interval)
-
-
-def steps_between(vessel: Vessel, interval: float) -> int:
-    """Integrator steps in one interval [s] between rows: 40 or more per ship length at Froude number 0.2."""
-    length = vessel.length or 30.0
-    passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))
-    return max(int(np.ceil(40 * interval / passing)), 1)
 
 
 def rank_candidates(

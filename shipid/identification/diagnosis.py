@@ -1,7 +1,7 @@
 """What is wrong where a vessel and a log disagree: every cause is a nuisance of one fit, and all of them are compared.
 
 **The fit.** Equations of motion and of kinematics are multiplied by a bump phi(t) that moves along the runs, and
-integrated by parts (the weak form of `shipid.identification.inverse`): nothing is differentiated, nothing diverges.
+integrated by parts (weak form: Messenger, Bortz, JCP 443 (2021) 110525): nothing is differentiated, nothing diverges.
 Each bump gives six residuals, measured change less predicted change: of u, v, r by the physics, of heading by the yaw
 rate, of position along and across by heading and velocities. A cause is a change of the log (commands, sensors), of
 the water or of the numbers of the vessel; it is fitted alone by Gauss-Newton from the same start.
@@ -58,6 +58,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import least_squares
 from scipy.special import exprel
 
 from shipid.data.checks import white_noise_of
@@ -82,6 +83,7 @@ EXACT = 0.01  # of the size of the terms: what no resampled log says better
 AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
+MOST_FORCES = 20  # evaluations of a fit of the forces alone
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
 PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics alone are judged
 MOST_SIZES = 2  # that a sentence names
@@ -546,6 +548,24 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
                 tells="the column that says ahead or astern",
                 cost=float((np.diff(signs) != 0).sum()),
             )
+
+
+def fit_forces(
+    vessel: Vessel, dataset: Dataset, runs: Sequence[str], spread: Array, centre: Array, widths: Array
+) -> Array:
+    """Factors (n,) with which the forces explain the motion of the runs, by least squares over the bumps.
+
+    spread : (P, n) change of each parameter of the vessel [SI] by each factor, from their `centre` (n,) on.
+    widths : (n,) prior standard deviation of each factor. Raises DataError for runs too short for a bump.
+    """
+    log = _VesselLog(vessel, dataset, runs, {})
+    weight = log.weights(log.residuals(log.motion))[:3, None]
+
+    def misfit(factors: Array) -> Array:
+        moved = replace(log.motion, parameters=log.motion.parameters + spread @ (factors - centre))
+        return np.append(weight * log.residuals(moved)[:3], (factors - centre) / widths)
+
+    return np.asarray(least_squares(misfit, centre, max_nfev=MOST_FORCES).x)
 
 
 def diagnose(

@@ -13,16 +13,18 @@ Pereyra, Inverse Problems 19 (2003) R1 (variable projection), with the Jacobian 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from shipid.identification.residuals import Problem, ResidualPrediction, predict_residuals
-from shipid.identification.settings import NUISANCES
+from shipid.identification.settings import NUISANCES, Identify
+from shipid.identification.statistics import LinearFit
 from shipid.interrupts import hold_interrupts
+from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, float], object]
@@ -51,26 +53,66 @@ class Point:
 class Result:
     """Result of one search.
 
-    factors : (n,). at : the prediction with these factors. objective : sum of squares with priors; inf if it diverges.
-    iterations : of the trust region. status : `ok`, `not converged`, `diverged` or `stopped`.
+    factors : (n,). at, point : prediction and unknowns of the runs with these factors. objective : sum of squares with
+    priors; inf if it diverges. iterations : of the trust region. status : `ok`, `not converged`, `diverged`, `stopped`.
     """
 
     factors: Array
     at: ResidualPrediction
+    point: Point
     objective: float
     iterations: int
     status: str
 
 
-def huber_loss(r: Array, threshold: float) -> tuple[Array, Array]:
-    """Huber loss of whitened residuals r: contribution of each to the objective, and its weight.
+@dataclass(frozen=True, kw_only=True)
+class Solution(LinearFit):
+    """Result of a fit: its linearisation at the estimates, and the status of the solver.
 
-    r^2 with weight 1 up to the threshold; linear beyond it, with weight threshold / |r|.
+    values : path -> value [SI] of every parameter that a factor acts on, tied ones included.
+    nuisances : run -> name -> estimate [SI] of the unknowns of that run. times : (m,) [s] of each residual.
+    objective_start, objective : sum of squares at the start, from the measured states, and at the end.
+    status : `ok`, `refused` (values that the vessel's checks refuse), `not converged`, `diverged` or `stopped`.
+    sentence : the status with its reason and a remedy. warnings : what the fit cannot see, one sentence each.
+    effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
+    within : signal -> share of its residuals up to the threshold of huber; 1 with the squared loss.
     """
+
+    vessel: Vessel
+    settings: Identify
+    values: Mapping[str, float]
+    nuisances: Mapping[str, Mapping[str, float]]
+    times: Array
+    objective_start: float
+    objective: float
+    iterations: int
+    seconds: float
+    status: str
+    sentence: str
+    within: Mapping[str, float]
+    point: Point = field(repr=False)
+    effective: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def common_current(self) -> tuple[float, float]:
+        """Current of all runs, to north and to east [m/s]; 0 where none was estimated, or another one by run."""
+        if self.settings.current != "one":
+            return 0.0, 0.0
+        north, east = (self.nuisances[self.runs[0]][name] for name in NUISANCES["current"])
+        return north, east
+
+    @property
+    def identified(self) -> Vessel:
+        """The vessel with the estimated values; DocumentError if its checks refuse them (status `refused`)."""
+        return self.vessel.with_values(self.values)
+
+
+def huber_loss(r: Array, threshold: float) -> Array:
+    """Huber loss of whitened residuals r: r^2 up to the threshold, linear beyond it."""
     size = np.abs(r)
-    inside = size <= threshold
     with np.errstate(all="ignore"):
-        return np.where(inside, r**2, 2 * threshold * size - threshold**2), np.where(inside, 1.0, threshold / size)
+        return np.where(size <= threshold, r**2, 2 * threshold * size - threshold**2)
 
 
 def initial_point(problem: Problem) -> Point:
@@ -98,17 +140,17 @@ def search_factors(
 
     Raises KeyboardInterrupt for Ctrl-C, after the current iteration. Errors raised by `progress` are passed on.
     """
-    free = problem.unknown.low < problem.unknown.high
     with hold_interrupts() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
-        watch = _IterationMonitor(progress, held, before)
-        run = _SearchState(
-            problem, evaluate_factors(problem, begin, best_valley(problem, begin, point) or point), free, watch
-        )
-        if not np.isfinite(run.start.objective):
-            return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
-        word = run.to_the_end(tolerance, most)
-    return Result(run.best.factors, run.best.at, run.best.objective, watch.iterations, word)
+        start = evaluate_factors(problem, begin, best_valley(problem, begin, point) or point)
+        if not np.isfinite(start.objective):
+            return Result(begin, start.at, start.point, float("inf"), before, "diverged")
+        run = _SearchState(problem, start, progress, held, before)
+        word, at_bound = run.minimise(tolerance, most), run.pushed()
+        if word == "ok" and at_bound.any():
+            word = run.settle(at_bound, tolerance, most)
+    best = run.best
+    return Result(best.factors, best.at, best.point, best.objective, run.iterations, word)
 
 
 def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
@@ -157,37 +199,24 @@ class _Evaluation:
         return total if np.isfinite(total) else float("inf")
 
 
-@dataclass
-class _IterationMonitor:
-    """Reports iterations to `progress`. held : Ctrl-C deferred by `hold_interrupts`. iterations : count so far."""
-
-    progress: Progress | None
-    held: list[int]
-    iterations: int
-
-    def stops(self, objective: float) -> bool:
-        """Report an iteration; True if `progress` or Ctrl-C asks to stop."""
-        asked = self.progress is not None and bool(self.progress(self.iterations, objective))
-        return asked or bool(self.held)
-
-
 class _SearchState:
-    """State of one search: the last, the best and the first evaluation, and which factors are free."""
+    """State of one search: the last and the best evaluation, which factors are free, and whether it is to stop.
 
-    def __init__(self, problem: Problem, start: _Evaluation, free: NDArray[np.bool_], watch: _IterationMonitor) -> None:
-        self.problem, self.free, self.watch = problem, free, watch
-        self.last = self.best = self.start = start
-        self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
+    held : Ctrl-C deferred by `hold_interrupts`. iterations : count so far.
+    """
 
-    def stops(self) -> bool:
-        """Whether `progress` or Ctrl-C has asked to stop."""
-        return self._stopped
+    def __init__(
+        self, problem: Problem, start: _Evaluation, progress: Progress | None, held: list[int], iterations: int
+    ) -> None:
+        self.problem, self.free = problem, problem.unknown.low < problem.unknown.high
+        self.last = self.best = start
+        self.progress, self.held, self.iterations, self.stopped = progress, held, iterations, False
+        self._report(start.objective)
 
-    def to_the_end(self, tolerance: float, most: int) -> str:
-        """Search, and once more with the factors on their bounds that were pushed there; the status."""
-        word = self.minimise(tolerance, most)
-        at_bound = self.pushed()
-        return self.settle(at_bound, tolerance, most) if word == "ok" and at_bound.any() else word
+    def _report(self, objective: float) -> None:
+        """Report an iteration; `progress` or Ctrl-C may ask to stop."""
+        asked = self.progress is not None and bool(self.progress(self.iterations, objective))
+        self.stopped = asked or bool(self.held)
 
     def _at(self, x: Array) -> _Evaluation:
         factors = self.best.factors.copy()
@@ -199,9 +228,9 @@ class _SearchState:
         return self.last
 
     def _after(self, intermediate_result: OptimizeResult) -> None:
-        self.watch.iterations += 1
-        if self.watch.stops(2 * float(intermediate_result.cost)):
-            self._stopped = True
+        self.iterations += 1
+        self._report(2 * float(intermediate_result.cost))
+        if self.stopped:
             raise StopIteration
 
     def minimise(self, tolerance: float, most: int) -> str:
@@ -210,7 +239,7 @@ class _SearchState:
         Where kinks of the equations (|v|, |r|) have stopped the short steps of a region, and a long Gauss-Newton step
         still goes down, the search goes on from there with a fresh region and scale.
         """
-        if self.stops():
+        if self.stopped:
             return "stopped"
         if not self.free.any():
             return "ok"
@@ -222,7 +251,7 @@ class _SearchState:
             if not self._stride():
                 crossings += 1
                 if crossings > CROSSINGS or not self._across():
-                    return "stopped" if self.stops() else word
+                    return "stopped" if self.stopped else word
             word = self._minimise(tolerance, most)
             if word == "stopped":
                 return word
@@ -260,17 +289,14 @@ class _SearchState:
         draw, around, misses, first = np.random.default_rng(0), AROUND, 0, self.best.objective
         for _ in range(ROUNDS):
             free = self.free & ~self.pushed()
-            if misses == MISSES or self.stops() or not self._promises(free):
-                break
+            promised = _gauss_newton(self.best.J[:, free], self.best.f)[2]
+            if misses == MISSES or self.stopped or promised <= FALL * self.best.objective:
+                break  # the derivatives promise no such fall, as they do in a kink
             if self._taken(free, self._sampled(free, draw, around), FALL / ROUNDS):
                 around, misses = min(3 * around, AROUND), 0
             else:
                 around, misses = around / 10, misses + 1
         return self.best.objective < first * (1 - FALL)
-
-    def _promises(self, free: NDArray[np.bool_]) -> bool:
-        """Whether the derivatives at the best point promise a fall by the share `FALL`, as they do in a kink."""
-        return _gauss_newton(self.best.J[:, free], self.best.f)[2] > FALL * self.best.objective
 
     def _sampled(self, free: NDArray[np.bool_], draw: np.random.Generator, around: float) -> Array:
         """Gauss-Newton step (free,) for the sum of the squares linearised at the best point and at points around it."""
@@ -303,7 +329,7 @@ class _SearchState:
             max_nfev=most,
             callback=self._after,
         )
-        if self.stops():
+        if self.stopped:
             return "stopped"
         return "not converged" if result.status == 0 else "ok"
 
@@ -397,7 +423,7 @@ def _robust_residuals(at: ResidualPrediction, threshold: float) -> tuple[Array, 
     """Residuals (m,) whose squares are the loss, their Jacobian (m, n), and the weight (m,) of any other derivative."""
     if not np.isfinite(threshold):
         return at.r, at.by_factor, np.ones(len(at.r))
-    f = np.sign(at.r) * np.sqrt(huber_loss(at.r, threshold)[0])
+    f = np.sign(at.r) * np.sqrt(huber_loss(at.r, threshold))
     slope = np.where(np.abs(at.r) <= threshold, 1.0, threshold / np.maximum(np.abs(f), threshold))
     return f, slope[:, None] * at.by_factor, slope
 
@@ -434,7 +460,7 @@ def _eliminate_run_unknowns(problem: Problem, factors: Array, point: Point) -> R
 
 def _run_objectives(problem: Problem, at: ResidualPrediction, threshold: float) -> Array:
     """Objective (R,) of each run, without the priors of the factors."""
-    total = np.bincount(at.run, huber_loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
+    total = np.bincount(at.run, huber_loss(at.r, threshold), len(problem.runs)) + (at.nuisances**2).sum(axis=1)
     if at.away.size:
         total += np.bincount(problem.whole.run, (at.away**2).sum(axis=1), len(problem.runs))
     return np.asarray(total)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,14 +12,15 @@ import pandas as pd
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
-from shipid.identification.residuals import CURRENT, build_problem
-from shipid.identification.segments import LEAST_STEPS, ShootingSegment
+from shipid.identification.residuals import CURRENT
+from shipid.identification.segments import LEAST_STEPS, ShootingSegment, cut_segments
 from shipid.identification.settings import ENVIRONMENT, Identify, resolve_overrides, run_overrides
 from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 CHANNELS = ("north", "east", "psi", "u", "v", "r")
+ERRORS_OF = ("u", "v", "r", "position")  # what free runs are judged by
 MOST_STEPS = 1e7  # of all runs together
 MEASURED, ALL = "measured", "all"
 """The log among the models of a series, and all runs together among the runs of a table of errors."""
@@ -63,6 +63,8 @@ def with_current(
     vessel: Vessel, settings: Identify, runs: Sequence[str], current: tuple[float, float]
 ) -> tuple[Vessel, Identify]:
     """Vessel and settings for free runs in one current, to north and to east [m/s]; what is set for a run stays."""
+    if not any(current):
+        return vessel, settings
     values = (math.hypot(*current), math.atan2(*current[::-1]))
     known = {f"{run}.{ENVIRONMENT}.{name}": x for run in runs for name, x in zip(CURRENT, values, strict=True)}
     sea = vessel if "current" in vessel.document else vessel.with_values({"current.kind": "uniform"})
@@ -70,12 +72,18 @@ def with_current(
 
 
 def simulate_free_runs(
-    vessels: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str], settings: Identify, length: float = 0.0
+    vessels: Mapping[str, Vessel],
+    dataset: Dataset,
+    runs: Sequence[str],
+    settings: Identify,
+    length: float = 0.0,
+    currents: Mapping[str, tuple[float, float]] | None = None,
 ) -> FreeRuns:
-    """Simulate vessels of one structure along recorded runs, in pieces of `length` [s]; 0: whole unbroken stretches.
+    """Simulate vessels along recorded runs, in pieces of `length` [s]; 0: whole unbroken stretches.
 
-    The settings give step, method and overrides; nuisances are at their fault-free values. Raises DataError for a
-    length shorter than two steps, and what `residuals.build` raises.
+    The settings give step, method and overrides; nuisances are at their fault-free values. currents : of a vessel by
+    its name, to north and to east [m/s]. Raises DataError for a length shorter than two steps, and what `cut_segments`
+    raises.
     """
     check_length(settings, length)
     spans = [float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for _, rows in stretches_of_runs(dataset.select(runs))]
@@ -83,55 +91,51 @@ def simulate_free_runs(
     if steps > MOST_STEPS:
         many = f"{settings.step:g} s makes {steps:.2g} steps of these runs, at most {MOST_STEPS:.0e}"
         raise DataError(f"{many}: give a longer step, or fewer runs", path="step")
-    overridden = run_overrides(settings, runs)
-    first = next(iter(vessels.values()))
-    asked = {"horizon": length, "nuisance": [], "current": "none", "runs": overridden}
-    problem = build_problem(first, dataset, runs, settings.model_copy(update=_held_settings(first, overridden) | asked))
-    given = np.array(list(first.parameters.values()))
-    predicted: dict[tuple[int, int], Array] = {}
-    for values in np.unique(problem.base, axis=0):  # runs of the same parameters at once
-        places = [i for i, one in enumerate(problem.segments) if np.array_equal(problem.base[one.run], values)]
-        rows = [np.where(values != given, values, list(vessel.parameters.values())) for vessel in vessels.values()]
-        states_of = _predict_pieces(first, [problem.segments[i] for i in places], np.array(rows), settings)
-        predicted |= {(model, places[piece]): states for (model, piece), states in states_of.items()}
-    parts = []
-    for number, run in enumerate(problem.runs):
-        places = [i for i, one in enumerate(problem.segments) if one.run == number]
-        parts += [
-            (run, piece, name, problem.segments[place], predicted[model, place])
-            for piece, place in enumerate(places)
-            for model, name in enumerate((MEASURED, *vessels))
-        ]
-    series = _state_series(parts)
+    frames = list[pd.DataFrame]()
+    for name, vessel in vessels.items():
+        sea, known = with_current(vessel, settings, runs, (currents or {}).get(name, (0.0, 0.0)))
+        overrides = resolve_overrides(known, runs, sea, vessel_dynamics(sea).environment, dataset.runs)
+        pieces = cut_segments(
+            sea, dataset, runs, settings.step, length, overrides=overrides, commands=settings.commands
+        )
+        if not frames:
+            log = [np.array([_log_column(piece, channel) for channel in CHANNELS]).T for piece in pieces]
+            frames = [_state_series(runs, pieces, MEASURED, log)]
+        frames.append(_state_series(runs, pieces, name, _predict_pieces(sea, runs, pieces, overrides, settings)))
+    series = pd.concat(frames, ignore_index=True)
     return FreeRuns(series.drop(columns="measured"), _series_errors(series))
 
 
-def _held_settings(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, object]:
-    """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides."""
-    numbers = (path for path, value in vessel.parameters.items() if value != 0)
-    path = next(path for path in numbers if not any(key.endswith(f".{path}") for key in overrides))
-    none: dict[str, object] = {"prior": {}, "bounds": {}, "scale": {}}
-    return none | {"parameters": [path], "fixed": [], "together": [], "ranges": False}
-
-
 def _predict_pieces(
-    vessel: Vessel, segments: Sequence[ShootingSegment], values: Array, settings: Identify
-) -> dict[tuple[int, int], Array]:
-    """(model, piece) -> states (N + 1, channels); model 0 is the log, model i > 0 has the parameters values[i - 1]."""
-    model = vessel_dynamics(vessel)
-    longest = max(segment.num_steps for segment in segments)
+    vessel: Vessel,
+    runs: Sequence[str],
+    pieces: Sequence[ShootingSegment],
+    overrides: Mapping[str, Mapping[str, float]],
+    settings: Identify,
+) -> list[Array]:
+    """States (N + 1, channels) of each piece; those of runs with the same parameters are simulated at once."""
+    result = dict[int, Array]()
+    numbers = [vessel.parameters | {k: x for k, x in overrides[run].items() if k in vessel.parameters} for run in runs]
+    for values in np.unique([list(of_run.values()) for of_run in numbers], axis=0):
+        places = [i for i, one in enumerate(pieces) if np.array_equal(list(numbers[one.run].values()), values)]
+        alike = [pieces[i] for i in places]
+        result |= dict(zip(places, _predict_alike(vessel, alike, values, settings), strict=True))
+    return [result[i] for i in range(len(pieces))]
 
-    def column(segment: ShootingSegment, name: str) -> Array:
-        return segment.columns.get(state_column(name), np.zeros(segment.num_steps + 1))
+
+def _predict_alike(
+    vessel: Vessel, pieces: Sequence[ShootingSegment], values: Array, settings: Identify
+) -> Iterator[Array]:
+    """States (N + 1, channels) of pieces that have the same parameters, NaN where one diverges."""
+    model = vessel_dynamics(vessel)
+    longest = max(piece.num_steps for piece in pieces)
 
     def held(name: str) -> Array:  # (longest, S): the last one where a piece is shorter
-        rows = [np.minimum(np.arange(longest), segment.num_steps - 1) for segment in segments]
-        return np.array([column(segment, name)[row] for segment, row in zip(segments, rows, strict=True)]).T
+        rows = [np.minimum(np.arange(longest), piece.num_steps - 1) for piece in pieces]
+        return np.array([_log_column(piece, name)[row] for piece, row in zip(pieces, rows, strict=True)]).T
 
-    start = {
-        name: np.array([column(segment, name)[0] for segment in segments]) for name in (*model.state, *model.hidden)
-    }
-    beside = tuple(name for name in LEANING if name in model.state)
+    start = {name: np.array([_log_column(one, name)[0] for one in pieces]) for name in (*model.state, *model.hidden)}
+    kept = (*CHANNELS, *(name for name in LEANING if name in model.state))
     path = rollout(
         vessel,
         start | body_velocities(start),
@@ -140,57 +144,50 @@ def _predict_pieces(
         step=settings.step,
         num_steps=longest,
         method=settings.method,
-        parameters=values,
-        memory={name: np.array([segment.memory[name][0] for segment in segments]) for name in model.memory},
-        keep=(*CHANNELS, *beside),
+        parameters=values[None],
+        memory={name: np.array([piece.memory[name][0] for piece in pieces]) for name in model.memory},
+        keep=kept,
     )
-    channels = {name: path[name] for name in (*CHANNELS, *beside)}
+    channels = {name: path[name] for name in kept}
     with np.errstate(all="ignore"):  # a path that diverges
         channels |= horizontal_velocities(channels)
-    moved = np.stack([channels[name] for name in CHANNELS], axis=-1)  # (N + 1, models, S, channels), as a log has them
-    result = {}
-    for piece, segment in enumerate(segments):
-        result[0, piece] = np.array([column(segment, name) for name in CHANNELS]).T
-        for number in range(len(values)):
-            states = moved[: segment.num_steps + 1, number, piece]  # what follows belongs to no log
-            failed = path.diverged[number, piece] and not _is_sound(states)
-            result[number + 1, piece] = np.full_like(states, np.nan) if failed else states
-    return result
+    moved = np.stack([channels[name][:, 0] for name in CHANNELS], axis=-1)  # (N + 1, S, channels), as a log has them
+    for number, piece in enumerate(pieces):
+        states = moved[: piece.num_steps + 1, number]  # what follows belongs to no log
+        sound = np.isfinite(states).all() and (np.hypot(*states[:, 3:5].T) <= SPEED_LIMIT).all()
+        yield states if sound or not path.diverged[0, number] else np.full_like(states, np.nan)
 
 
-def _is_sound(states: Array) -> bool:
-    """Whether states (N + 1, channels) are finite and those of a ship; see `Trajectories.diverged`."""
-    speed = np.hypot(states[:, CHANNELS.index("u")], states[:, CHANNELS.index("v")])
-    return bool(np.isfinite(states).all() and (speed <= SPEED_LIMIT).all())
+def _log_column(piece: ShootingSegment, name: str) -> Array:
+    """Measured values (N + 1,) of a state or an input; 0 where there are none."""
+    return piece.columns.get(state_column(name), np.zeros(piece.num_steps + 1))
 
 
-def _state_series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:
-    runs, pieces, models, segments, states = zip(*parts, strict=True)
-    lengths = [len(segment.t) for segment in segments]
-    heads = {"run": runs, "piece": pieces, "model": models}
-    columns: dict[str, Any] = {name: np.repeat(np.array(head), lengths) for name, head in heads.items()}
-    columns |= {"t": np.concatenate([segment.t for segment in segments])}
-    columns |= dict(zip(CHANNELS, np.concatenate(states).T, strict=True))
-    seen = [segment.measured & (np.arange(len(segment.t)) > 0) for segment in segments]
-    frame = pd.DataFrame({**columns, "measured": np.concatenate(seen)})
-    return frame[["run", "piece", "t", "model", *CHANNELS, "measured"]]
+def _state_series(
+    runs: Sequence[str], pieces: Sequence[ShootingSegment], model: str, states: Sequence[Array]
+) -> pd.DataFrame:
+    """The series of one model; `measured`: rows that count for the errors."""
+    numbers = np.array([piece.run for piece in pieces])
+    place = np.arange(len(pieces)) - np.searchsorted(numbers, numbers)
+    frames = [
+        pd.DataFrame(values, columns=list(CHANNELS)).assign(
+            run=runs[piece.run], piece=number, t=piece.t, model=model,
+            measured=piece.measured & (np.arange(len(piece.t)) > 0),
+        )
+        for number, piece, values in zip(place, pieces, states, strict=True)
+    ]  # fmt: skip
+    return pd.concat(frames, ignore_index=True)[["run", "piece", "t", "model", *CHANNELS, "measured"]]
 
 
 def _series_errors(series: pd.DataFrame) -> pd.DataFrame:
-    log = series[series["model"] == MEASURED]
-    rows = []
-    for model in [name for name in series["model"].unique() if name != MEASURED]:
-        rows_of_model = series[series["model"] == model]
-        away = rows_of_model[list(CHANNELS)].to_numpy() - log[list(CHANNELS)].to_numpy()
-        squares = {
-            "u": away[:, 3] ** 2, "v": away[:, 4] ** 2, "r": away[:, 5] ** 2,
-            "position": away[:, 0] ** 2 + away[:, 1] ** 2,
-        }  # fmt: skip
-        seen = rows_of_model["measured"].to_numpy()
-        for run in (ALL, *rows_of_model["run"].unique()):
-            selected = seen & (
-                np.ones(len(rows_of_model), dtype=bool) if run == ALL else (rows_of_model["run"] == run).to_numpy()
-            )
-            rms = {name: float(np.sqrt(square[selected].mean())) for name, square in squares.items()}
-            rows.append({"run": run, "model": model, **rms, "samples": int(selected.sum())})
+    """Root mean squares over the measured rows of all runs, and of each."""
+    log, rows = series.loc[series["model"] == MEASURED, list(CHANNELS)].to_numpy(), list[dict[str, object]]()
+    for model, mine in series[series["model"] != MEASURED].groupby("model", sort=False):
+        squares = pd.DataFrame((mine[list(CHANNELS)].to_numpy() - log) ** 2, columns=list(CHANNELS))
+        squares["position"] = squares["north"] + squares["east"]
+        for run in (ALL, *mine["run"].unique()):
+            selected = mine["measured"].to_numpy() & (np.full(len(mine), run == ALL) | (mine["run"] == run).to_numpy())
+            rms = np.sqrt(squares.loc[selected, list(ERRORS_OF)].to_numpy().mean(axis=0))
+            rows.append({"run": run, "model": model, **dict(zip(ERRORS_OF, rms.tolist(), strict=True))})
+            rows[-1]["samples"] = int(selected.sum())
     return pd.DataFrame(rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -21,32 +21,57 @@ from shipid.data.held import constant_commands, warn_of_constant_commands
 from shipid.data.outputs import compare_outputs, outputs_in_common
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
-from shipid.engine.engines import REPEATED
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.files import write_new
 from shipid.identification import design
-from shipid.identification.bands import LONG, Measure, band_refusal, check_level, measure_bands
-from shipid.identification.curvature import curvature_warning
-from shipid.identification.fit import Progress
-from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs, with_current
+from shipid.identification.bands import (
+    LONG,
+    Trial,
+    band_refusal,
+    check_level,
+    data_reach,
+    extrapolation_sentence,
+    measure_bands,
+    memory_of_signals,
+    of_log,
+    perform_trials,
+    residual_spacing,
+    select_measures,
+)
+from shipid.identification.fit import Progress, Solution
+from shipid.identification.free_run import (
+    ALL,
+    ERRORS_OF,
+    FreeRuns,
+    check_length,
+    missing_inputs,
+    simulate_free_runs,
+    with_current,
+)
 from shipid.identification.plausible import implausibility
-from shipid.identification.profile import Profile, profile_factor, variance_ratio
-from shipid.identification.reach import data_reach, extrapolation_sentence, of_log
-from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
-from shipid.identification.solution import Solution
+from shipid.identification.profile import Profile, curvature_warning, profile_factor, profile_table, variance_ratio
+from shipid.identification.settings import (
+    BLOCK,
+    Identify,
+    free_factors,
+    resolve_overrides,
+    run_overrides,
+    weighted_columns,
+)
 from shipid.identification.solve import identify
 from shipid.identification.statistics import (
-    LinearFit,
     Statistics,
     against_priors,
     factors_of_single_runs,
     fit_statistics,
     open_to_drift,
     pooled_autocorrelation,
+    runs_of_signal,
 )
 from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.interrupts import hold_interrupts
-from shipid.simulation.measured import TRIALS, measure_standard
+from shipid.report.identification import IdentificationContent
+from shipid.simulation.measured import TRIALS
 from shipid.units import join_names, percent_text, plural_word, significant_digits
 from shipid.version import __version__
 from shipid.vessel.dynamics import vessel_dynamics
@@ -56,7 +81,6 @@ from shipid.vessel.ranges import find_contradictions
 
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
-ERRORS_OF = ("u", "v", "r", "position")  # what free runs are judged by
 WORSE = 0.02  # of the error of free runs before the fit: what is more by less is not worse
 ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
@@ -76,55 +100,28 @@ class SettingsFile(BaseModel):
     identify: Identify
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
-    """Result of an identification with its statistics and its validation.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Identification(IdentificationContent):
+    """Result of an identification with its statistics and its validation: the content of its page, and more.
 
-    vessel : the base vessel. digest : of the dataset. ahead : length of a free run [s], 0 for whole runs.
-    estimates : `path`, `name` (short), `with` (tied paths), `unit`, `base`, `value`, `error`, `low`, `high` [unit],
-    `factor`, `factor_error`, `factor_low`, `factor_high` [1], `identified`, `reason`.
-    free : set (`fit`, `test`) -> free runs `before` and `after`.
-    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`; with a band also `low` and `high`.
-    colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
-    beyond : sentences on standard manoeuvres that go farther than the fitted runs.
+    vessel : the base vessel. runs : those fitted. digest : of the dataset.
+    estimates also has `with` (tied paths), `low`, `high` [unit], `factor_error`.
+    curves : the profiles. programme : manoeuvres to run next, of `shipid.identification.design.rank_candidates`.
     outputs : of components: `output`, `unit`, root mean square `measured`, and of the difference `before` and `after`.
-    programme : manoeuvres to run next, of `shipid.identification.design.rank_candidates`; None: not requested.
     """
 
     vessel: Vessel
     solution: Solution
     statistics: Statistics
     runs: tuple[str, ...]
-    held_out: tuple[str, ...]
     digest: str
-    estimates: pd.DataFrame
-    ahead: float
-    free: Mapping[str, FreeRuns]
-    manoeuvres: pd.DataFrame
-    colours: pd.DataFrame
-    programme: pd.DataFrame | None
-    profiles: tuple[Profile, ...]
-    warnings: tuple[str, ...]
-    beyond: tuple[str, ...]
+    curves: tuple[Profile, ...]
     outputs: pd.DataFrame
 
-    @property
-    def errors(self) -> pd.DataFrame:
-        """Errors of all free runs: the columns of `FreeRuns.errors`, and `set` (`fit` or `test`)."""
-        return pd.concat([runs.errors.assign(set=name) for name, runs in self.free.items()], ignore_index=True)
-
-    @property
-    def unseen(self) -> tuple[str, ...]:
-        """Sentences that explain unidentified parameters: collinear combinations first, then other reasons."""
-        vague = self.estimates[~self.estimates["identified"].astype(bool)]
-        combinations = [
-            combination
-            for combination in self.statistics.combinations
-            if not set(combination.paths).isdisjoint(vague["path"])
-        ]
-        explained = {path for combination in combinations for path in combination.paths}
-        others = vague.loc[~vague["path"].isin(explained), "reason"]
-        return (*(combination.sentence() for combination in combinations), *map(str, others))
+    def page(self, dataset: str | Path, command: str = "") -> Identification:
+        """The content of a page; dataset : file of the runs. command : command line that reproduces the outcome."""
+        origin = {**self.provenance, "Dataset": f"{dataset}, digest {self.digest}"}
+        return replace(self, provenance=origin, command=command, study_document=self.patch(Path()))
 
     def patch(self, file: Path) -> str:
         """The patch as TOML, to be written to `file`: `load_vessel` on it rebuilds the identified vessel exactly.
@@ -143,7 +140,7 @@ class Identification:
             base_digest=digest,
             source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
             values=changed | dict(solution.values),
-            provenance=_as_toml_value(self._provenance()),
+            provenance=documents.plain_values(self._provenance()),
             unusual=tuple(_unusual_numbers(vessel.with_values(solution.values))),
         )
 
@@ -170,7 +167,7 @@ class Identification:
                 f"{row['set']} {row['model']}": {name: _round_significant(row[name]) for name in ERRORS_OF}
                 for row in free
             },
-            "settings": solution.settings.model_dump(),
+            "settings": solution.settings.model_dump(exclude_none=True),
         }
 
 
@@ -270,97 +267,99 @@ def run_identification(
     digest = dataset.digest
     dataset, fitted, shared = without_shared(dataset, fitted, tested)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
+    ranked, lacking = pd.DataFrame(), ""
     with hold_interrupts() as held:  # an interrupted library call raises an unrelated error
-
-        def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
-            return {name: simulate_free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
-
-        free({BEFORE: vessel})  # an error in the free runs is raised before the long fit
+        for each in sets.values():  # an error in the free runs is raised before the long fit
+            simulate_free_runs({BEFORE: vessel}, dataset, each, settings, ahead)
         _go_on(held)
         fit_settings = settings.model_copy(update={"runs": run_overrides(settings, fitted)})
         solution = identify(vessel, dataset, fitted, fit_settings, progress=progress)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
-        if (solution.at_bound | solution.held).all():
-            raise ShipidError(_no_estimate_reason(solution))
         _go_on(held)
         settings = settings.model_copy(update={"step": solution.settings.step})
-        judged = fit_statistics(LinearFit.of(solution))
+        judged = fit_statistics(solution)
         determined = [path for path in profiles if path in judged.free]
         curves = tuple(_profile(path, dataset, solution, judged) for path in determined)
-        pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
-        pairs = (
-            free(pair)
-            if not any(solution.common_current)
-            else {
-                name: _free_runs_in_current(pair, solution, dataset, each, settings, ahead)
-                for name, each in sets.items()
-            }
-        )
+        identified = vessel.with_values(solution.values)
+        pair, flows = {BEFORE: vessel, AFTER: identified}, {AFTER: solution.common_current}
+        free = {name: simulate_free_runs(pair, dataset, each, settings, ahead, flows) for name, each in sets.items()}
+        manoeuvres, logs = _compare_manoeuvres(pair)
+        refused = "" if band is None else band_refusal(solution, judged)
+        if band is not None and not refused:
+            perform = partial(select_measures, trials=_standard_trials(), shown=COMPARED)
+            ends = measure_bands(vessel, solution, judged, perform, band)
+            ends = ends[["manoeuvre", "measure", "low", "high"]]
+            manoeuvres = manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"])
+        curved = curvature_warning(solution, dataset, judged, determined)
         _go_on(held)
-        logs: dict[str, pd.DataFrame] = {}
-        manoeuvres, refused = _compare_manoeuvres(pair, logs), ""
-        if band is not None:
-            manoeuvres, refused = _add_measure_bands(manoeuvres, vessel, solution, judged, band)
-        _go_on(held)
+        outputs = _compare_outputs(pair, solution, dataset, fitted)
+        if programme:
+            ranked, lacking = _next_manoeuvres(identified, dataset, fitted, solution, judged)
+        reach = data_reach(vessel, dataset, fitted)
         warnings = (
             *shared,
             *solution.warnings,
             *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
-            *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER]), settings),
-            *filter(None, (curvature_warning(solution, dataset, judged, determined, partial(_go_on, held)),)),
+            *_fit_warnings(solution, judged, free, yaw_growth_rate(dataset, fitted, identified), settings),
+            curved,
             *_better_fit_warnings(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"
                 for path in profiles
                 if path not in determined
             ),
+            *_implausible_estimates(vessel, identified, solution.values),
+            *_unused_output_warnings(outputs, settings),
+            lacking,
+            refused and f"no bands on standard manoeuvres: {refused}",
         )
-        warnings += _implausible_estimates(vessel, pair[AFTER], solution.values)
-        outputs = _compare_outputs(pair, solution, dataset, fitted)
-        warnings += tuple(_unused_output_warnings(outputs, settings))
-        ranked = None
-        if programme:
-            ranked, missing = _next_manoeuvres(pair[AFTER], dataset, fitted, solution, judged)
-            warnings += tuple(filter(None, (missing,)))
-        if refused:
-            warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
+        estimates = _estimate_table(vessel, solution, judged)
         return Identification(
+            title=f"{vessel.name}, identified",
+            name=vessel.key,
+            provenance={
+                "Vessel": f"{vessel.name}, digest {vessel.digest}",
+                "Dataset": f"digest {digest}",
+                "Fitted": ", ".join(fitted),
+                "Held out": ", ".join(tested) or "none",
+                "Fit": f"{solution.sentence}; objective {solution.objective:.6g}, at first "
+                f"{solution.objective_start:.6g}",
+                "shipid": __version__,
+            },
             vessel=vessel,
             solution=solution,
             statistics=judged,
             runs=fitted,
             held_out=tested,
             digest=digest,
-            estimates=_estimate_table(vessel, solution, judged),
+            estimates=estimates,
+            correlations=judged.correlations,
+            unseen=_unseen_sentences(estimates, judged),
             ahead=ahead,
-            free=pairs,
+            errors=pd.concat([runs.errors.assign(set=name) for name, runs in free.items()], ignore_index=True),
+            series=free["test" if tested else "fit"].series,
             manoeuvres=manoeuvres,
             colours=_whiteness_table(solution),
             programme=ranked,
-            profiles=curves,
-            warnings=warnings,
-            beyond=_extrapolated_manoeuvres(pair[AFTER], dataset, fitted, logs),
+            curves=curves,
+            profiles=pd.concat([pd.DataFrame(), *map(profile_table, curves)], ignore_index=True),
+            warnings=tuple(filter(None, warnings)),
+            beyond=tuple(
+                filter(None, (extrapolation_sentence(title, of_log(identified, log), reach) for title, log in logs))
+            ),
             outputs=outputs,
         )
 
 
-def _free_runs_in_current(
-    pair: Mapping[str, Vessel],
-    solution: Solution,
-    dataset: Dataset,
-    runs: Sequence[str],
-    settings: Identify,
-    ahead: float,
-) -> FreeRuns:
-    """Free runs of the base, and of the identified vessel in the current of all runs that was estimated with it."""
-    sea, known = with_current(pair[AFTER], settings, runs, solution.common_current)
-    before = simulate_free_runs({BEFORE: pair[BEFORE]}, dataset, runs, settings, ahead)
-    after = simulate_free_runs({AFTER: sea}, dataset, runs, known, ahead)
-    series = pd.concat([before.series, after.series[after.series["model"] == AFTER]], ignore_index=True)
-    return FreeRuns(series, pd.concat([before.errors, after.errors], ignore_index=True))
+def _unseen_sentences(estimates: pd.DataFrame, judged: Statistics) -> tuple[str, ...]:
+    """What explains unidentified parameters: collinear combinations first, then other reasons."""
+    vague = estimates[~estimates["identified"].astype(bool)]
+    sets = [one for one in judged.combinations if not set(one.paths).isdisjoint(vague["path"])]
+    explained = {path for one in sets for path in one.paths}
+    return (*(one.sentence() for one in sets), *vague.loc[~vague["path"].isin(explained), "reason"].astype(str))
 
 
 def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
@@ -394,15 +393,6 @@ def _unusual_numbers(vessel: Vessel) -> dict[str, str]:
     return find_contradictions(vessel.document, vessel.parameters)
 
 
-def _no_estimate_reason(solution: Solution) -> str:
-    if not solution.dropped:
-        return "every parameter is at a bound or fixed: free more parameters, or widen bounds"
-    remedy = f"give a drop of less than {solution.settings.drop:g}, or runs that excite them more"
-    if len(solution.dropped) == len(solution.paths):
-        return f"every parameter was dropped, because the data do not support a change of any: {remedy}"
-    return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
-
-
 def _compare_outputs(
     pair: Mapping[str, Vessel], solution: Solution, dataset: Dataset, runs: Sequence[str]
 ) -> pd.DataFrame:
@@ -433,19 +423,6 @@ def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterat
         if row["output"] not in settings.weights:
             name, width = row["output"], f"{ACCURATE * row['measured']:.2g}"
             yield f"{name} was measured and is not fitted: --set weights.{name}={width} [{row['unit']}]"
-
-
-def _extrapolated_manoeuvres(
-    vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]
-) -> tuple[str, ...]:
-    data = data_reach(vessel, dataset, runs)
-    return tuple(
-        filter(None, (extrapolation_sentence(title, of_log(vessel, log), data) for title, log in logs.items()))
-    )
-
-
-def _manoeuvre_title(kind: str, angles: Sequence[float]) -> str:
-    return f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}"
 
 
 def _go_on(held: Sequence[int]) -> None:
@@ -510,75 +487,40 @@ def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> p
     return pd.DataFrame(rows)
 
 
-def _compare_manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None = None) -> pd.DataFrame:
-    """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`.
+def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, list[tuple[str, pd.DataFrame]]]:
+    """Manoeuvre measures of both vessels, and the logs of the last vessel by title.
 
-    logs : takes the log of the last vessel in each manoeuvre, by title.
+    Where a vessel cannot perform one: NaN, and the reason in `note`.
     """
-    rows = []
-    for kind, angles in TRIED:
-        title = _manoeuvre_title(kind, angles)
-        values: dict[str, dict[str, dict[str, Any]]] = {}
-        notes: dict[str, str] = {}
-        for name, vessel in pair.items():
-            try:
-                values[name] = _measure_manoeuvre(vessel, kind, angles, logs if name == AFTER else None)
-            except ShipidError as error:
-                values[name] = {}
-                notes[name] = error.message
-        said = [f"{name}: {message}" for name, message in notes.items()]
-        if len(notes) == len(pair):
-            why = list(dict.fromkeys(notes.values()))
-            nothing = dict.fromkeys(pair, float("nan"))
-            note = why[0] if len(why) == 1 else "; ".join(said)
-            rows.append({"manoeuvre": title, "measure": "", "unit": "", **nothing, "note": note})
+    trials, rows = _standard_trials(), list[dict[str, Any]]()
+    each = {name: perform_trials(vessel, trials) for name, vessel in pair.items()}
+    for title, (kind, *_) in trials.items():
+        said = [f"{name}: {refused[title]}" for name, (_, refused) in each.items() if title in refused]
+        if len(said) == len(pair):
+            why = {refused[title] for _, refused in each.values()}
+            note = why.pop() if len(why) == 1 else "; ".join(said)
+            rows.append({"manoeuvre": title, "measure": "", "note": note})
             continue
+        known = {
+            name: {row["measure"]: row for row in done[title].measures}
+            for name, (done, _) in each.items()
+            if title in done
+        }
         for measure in COMPARED[kind]:
-            measured = {name: values[name].get(measure) for name in pair}
-            unit = next((row["unit"] for row in measured.values() if row is not None), "")
-            numbers = {name: float("nan") if row is None else row["value"] for name, row in measured.items()}
-            why = [f"{name}: {row['note']}" for name, row in measured.items() if row is not None and row["note"]]
-            note = "; ".join([*said, *why])
-            rows.append({"manoeuvre": title, "measure": measure, "unit": unit, **numbers, "note": note})
-    return pd.DataFrame(rows)
+            found = {name: by_measure[measure] for name, by_measure in known.items() if measure in by_measure}
+            notes = [*said, *(f"{name}: {row['note']}" for name, row in found.items() if row["note"])]
+            numbers = {name: row["value"] for name, row in found.items()}
+            unit = next((row["unit"] for row in found.values()), "")
+            rows.append({"manoeuvre": title, "measure": measure, "unit": unit, **numbers, "note": "; ".join(notes)})
+    frame = pd.DataFrame(rows, columns=["manoeuvre", "measure", "unit", *pair, "note"]).astype(
+        dict.fromkeys(pair, float)
+    )
+    return frame.fillna({"unit": ""}), [(title, one.frame) for title, one in each[AFTER][0].items()]
 
 
-def _add_measure_bands(
-    manoeuvres: pd.DataFrame, vessel: Vessel, solution: Solution, judged: Statistics, level: float
-) -> tuple[pd.DataFrame, str]:
-    """The measures with the band of each, `low` and `high`; or as they are, and why there is no band."""
-    why = band_refusal(solution, judged, residual_spacing(solution))
-    if why:
-        return manoeuvres, why
-
-    def performed(kind: str, angles: Sequence[float]) -> Measure:
-        def measure(one: Vessel) -> dict[str, float]:
-            measures = _measure_manoeuvre(one, kind, angles)
-            return {name: float(measures[name]["value"]) for name in COMPARED[kind] if name in measures}
-
-        return measure
-
-    titled = [(_manoeuvre_title(kind, angles), performed(kind, angles)) for kind, angles in TRIED]
-    measures = measure_bands(vessel, solution, judged, titled, level)
-    ends = measures[["manoeuvre", "measure", "low", "high"]]
-    return manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"]), ""
-
-
-def _measure_manoeuvre(
-    vessel: Vessel, kind: str, angles: Sequence[float], logs: dict[str, pd.DataFrame] | None = None
-) -> dict[str, dict[str, Any]]:
-    """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.criteria.measure_rows`."""
-    done = measure_standard(vessel, kind, angles, engine=REPEATED)
-    if logs is not None:
-        logs[_manoeuvre_title(kind, angles)] = done.frame
-    return {row["measure"]: row for row in done.measures}
-
-
-def residual_spacing(solution: Solution) -> float:
-    """Median time between residuals of one signal within a run [s], over all runs."""
-    selected = np.array(solution.signals) == solution.signals[0]
-    steps = np.diff(solution.times[selected])[np.diff(solution.clusters[selected]) == 0]
-    return float(np.median(steps)) if len(steps) else solution.settings.step
+def _standard_trials() -> dict[str, Trial]:
+    titles = [f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}" for kind, angles in TRIED]
+    return {title: (kind, angles, "starboard") for title, (kind, angles) in zip(titles, TRIED, strict=True)}
 
 
 def _longest_run(solution: Solution) -> float:
@@ -587,32 +529,29 @@ def _longest_run(solution: Solution) -> float:
 
 
 def _whiteness_table(solution: Solution) -> pd.DataFrame:
-    labels, between, frames = np.array(solution.signals), residual_spacing(solution), []
+    between, frames = residual_spacing(solution), []
     for name in dict.fromkeys(solution.signals):
-        selected = labels == name
-        rho = pooled_autocorrelation(
-            [solution.residuals[selected & (solution.clusters == run)] for run in np.unique(solution.clusters)]
-        )
-        lags = np.arange(min(len(rho), 61))
-        frames.append(pd.DataFrame({"signal": name, "lag": between * lags, "correlation": rho[lags]}))
+        rho = pooled_autocorrelation([solution.residuals[run] for run in runs_of_signal(solution, name)])[:61]
+        frames.append(pd.DataFrame({"signal": name, "lag": between * np.arange(len(rho)), "correlation": rho}))
     return pd.concat(frames, ignore_index=True)
 
 
 def _next_manoeuvres(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, judged: Statistics
-) -> tuple[pd.DataFrame | None, str]:
+) -> tuple[pd.DataFrame, str]:
     """Ranked manoeuvres at the median speed of the fitted runs and at half, and a sentence on those that cannot be."""
-    speed, limits = design.recorded_limits(vessel, dataset, runs)
+    speed, most = design.recorded_limits(vessel, dataset, runs)
     unknown, settings = free_factors(solution.vessel, solution.settings), solution.settings
     own = sum(path in vessel.parameters for path in unknown.paths)  # no manoeuvre has the current
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
-    spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
+    levels = {name: judged.whiteness[weighted_columns(name)[0]].level for name in motions}
+    spread = {name: width * (levels[name] or EXACT) for name, width in motions.items()}
     try:
-        choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), limits)
+        choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), most)
         settings = settings.model_copy(update={"weights": spread})
         contributions = design.information_where_possible(solution.vessel, choice, settings, solution.factors[:own])
     except ShipidError as error:  # no shaft speed gives these speeds, or the ship has no length
-        return None, f"no manoeuvres to run next: {error.message}"
+        return pd.DataFrame(), f"no manoeuvres to run next: {error.message}"
     possible = {one.candidate.title for one in contributions}
     lacking = [one.title for one in choice if one.title not in possible]
     words = f"not among the manoeuvres to run next, for the identified ship cannot perform them: {'; '.join(lacking)}"
@@ -621,12 +560,6 @@ def _next_manoeuvres(
     known = whole[:own, :own] - whole[:own, own:] @ np.linalg.solve(whole[own:, own:], whole[own:, :own])
     table = design.rank_candidates(contributions, unknown.paths[:own], known)
     return table, words if lacking else ""
-
-
-def residual_level(judged: Statistics, signal: str) -> float:
-    """Standard deviation of the residuals of a signal, over the declared one."""
-    columns = {"position": "north"}
-    return judged.whiteness[columns.get(signal, signal)].level
 
 
 def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics) -> Profile:
@@ -686,17 +619,14 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
     return [f"{join_names(held)} {are} the same in all runs to fit: what other orders do there is not learnt"]
 
 
-def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[str]:
-    warnings = []
+def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> Iterator[str]:
     for curve in curves:
         estimate = solution.factors[solution.paths.index(curve.path)]
-        best = curve.values[np.argmin(curve.rises)]
         if curve.rises[np.argmin(np.abs(curve.values - estimate))] > BETTER * curve.limit:
-            warnings.append(
-                f"the estimate is not the optimum: the profile of {curve.path} fits better at {best:.4g}; give "
-                "priors, or another start or horizon"
+            yield (
+                f"the estimate is not the optimum: the profile of {curve.path} fits better at "
+                f"{curve.values[np.argmin(curve.rises)]:.4g}; give priors, or another start or horizon"
             )
-    return warnings
 
 
 def _fit_warnings(
@@ -706,8 +636,7 @@ def _fit_warnings(
 
     rate : at which a small yaw of the identified ship grows [1/s]. settings : as given, with what priors they name.
     """
-    warnings, between = [], residual_spacing(solution)
-    coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
+    warnings, coloured = list[str](), memory_of_signals(solution, judged)
     horizon = solution.settings.horizon
     if coloured:
         longest = max(coloured.values())
@@ -734,7 +663,7 @@ def _fit_warnings(
         warnings += [
             f"run {run} alone decides {path}: the interval takes the errors of this run to be like those of others; "
             f"excite {path} in another run, too"
-            for path, run in factors_of_single_runs(judged.fit).items()
+            for path, run in factors_of_single_runs(judged).items()
         ]
     drifting = open_to_drift(judged) if best.kind == "fisher" and best.trusted else {}
     if drifting:
@@ -746,7 +675,7 @@ def _fit_warnings(
             f"intervals say, by these factors: {join_names(said)}; fit more runs"
         )
     named = isinstance(settings.nuisance, Mapping) and "current" in settings.nuisance
-    contrary = {path: of for path, of in against_priors(judged.fit).items() if named or path in solution.values}
+    contrary = {path: of for path, of in against_priors(judged).items() if named or path in solution.values}
     if contrary:
         of_path = dict(zip(solution.paths, short_names(solution.paths), strict=True))
         said = [
@@ -791,12 +720,3 @@ def _worse_signals(errors: pd.DataFrame) -> list[str]:
 def _round_significant(value: float) -> float:
     """Round to 6 significant digits, so that the text does not depend on the machine."""
     return float(f"{value:.6g}")
-
-
-def _as_toml_value(value: Any) -> Any:
-    """Convert a value for TOML: None entries are removed, tuples become lists."""
-    if isinstance(value, Mapping):
-        return {str(key): _as_toml_value(item) for key, item in value.items() if item is not None}
-    if isinstance(value, list | tuple):
-        return [_as_toml_value(item) for item in value]
-    return value

@@ -130,19 +130,27 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
     scalars |= {path: (0.0, 0.0) for path in unknown.paths if path in scalars}  # one for all runs: a factor
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
-    numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
-    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers, settings.commands)
-    weather = _given_environment(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
+    segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, overridden, settings.commands)
     _check_set_for_a_run(unknown, overridden, widths)
+    given = {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
+    given |= {name for one in segments for name in model.environment if np.any(one.columns.get(name, 0.0))}
+    given -= set(CURRENT) if set(NUISANCES["current"]) & set(names) else set()
     return Problem(
         vessel=vessel,
         runs=tuple(runs),
         settings=settings,
         unknown=unknown,
         layout=FitLayout(
-            model, groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
+            model=model,
+            groups=groups,
+            signals=tuple(settings.signals),
+            nuisances=names,
+            weather=tuple(name for name in model.environment if name in given),
+            lags=lags,
+            step=settings.step,
+            method=settings.method,
         ),
-        segments=tuple(_with_weather(segment, weather, overridden[runs[segment.run]]) for segment in segments),
+        segments=tuple(segments),
         base=np.array(
             [[overridden[run].get(path, value) for path, value in vessel.parameters.items()] for run in runs]
         ),
@@ -204,43 +212,6 @@ def _check_set_for_a_run(
             raise DocumentError(message, path=f"{BLOCK}.runs.{run}.{path}")
 
 
-def _given_environment(
-    segments: Sequence[ShootingSegment],
-    overridden: Mapping[str, Mapping[str, float]],
-    channels: Sequence[str],
-    estimated: Sequence[str],
-) -> list[str]:
-    """Environment channels that the data or an override provide and that the fit does not estimate."""
-    given = {name for name in channels if any(np.any(one.columns[name]) for one in segments if name in one.columns)}
-    given |= {path.removeprefix(f"{ENVIRONMENT}.") for values in overridden.values() for path in values}
-    return [name for name in channels if name in given and not (estimated and name in CURRENT)]
-
-
-def _with_weather(segment: ShootingSegment, weather: Sequence[str], overridden: Mapping[str, float]) -> ShootingSegment:
-    zero = np.zeros_like(segment.t)
-    columns = {
-        **segment.columns,
-        **{name: segment.columns.get(name, zero) for name in weather},
-        **{
-            name: zero + overridden[f"{ENVIRONMENT}.{name}"]
-            for name in weather
-            if f"{ENVIRONMENT}.{name}" in overridden
-        },
-    }
-    return ShootingSegment(segment.run, segment.t, columns, segment.earlier, segment.memory, segment.measured)
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """Output of the engine for S predictions of N steps.
-
-    r : (S, N ny) weighted residuals. R : (S, N ny, nc) their derivatives to initial state, factors and nuisances.
-    """
-
-    r: Array
-    R: Array
-
-
 class Predictions:
     """All S predictions of a fit as arrays for the engine; shorter predictions are padded with weight 0.
 
@@ -260,9 +231,6 @@ class Predictions:
         compiled = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and find_compiler() is not None
         self.steps = known, seen
         self.packed = (pack_lanes(known), pack_lanes(seen)) if compiled else None
-
-    def __len__(self) -> int:
-        return len(self.run)
 
     def _log(self, segment: ShootingSegment) -> list[float]:
         columns = (segment.columns.get(state_column(name)) for name in self.problem.model.entries)
@@ -289,7 +257,8 @@ class Predictions:
         columns = [
             commands[name][at + layout.lags - j] for j in range(layout.lags + 1) for name in layout.model.commands
         ]
-        return columns + [segment.columns[name][at] for name in layout.weather]
+        still = np.zeros_like(segment.t)
+        return columns + [segment.columns.get(name, still)[at] for name in layout.weather]
 
     def _seen(self, segment: ShootingSegment) -> tuple[Array, Array, Array]:
         """Measured signals beside their weights (N, 2 ny), the weights, and the times (N,)."""
@@ -313,7 +282,7 @@ class Predictions:
 
     def begin(self, nuisances: Array) -> tuple[Array, Array]:
         """Initial states (S, nn) from the log, and their derivatives (S, nn, nq) to the nuisances (R, nq) [SI]."""
-        model, count = self.problem.model, len(self)
+        model, count = self.problem.model, len(self.run)
         entries, states, q = model.begin.size1_in(0), len(model.states), nuisances[self.run]
         nodes = np.array(model.begin.map(count)(self.log[:, :entries].T, q.T)).T
         slope = np.zeros((count, len(model.node), q.shape[1]))
@@ -322,12 +291,14 @@ class Predictions:
             slope[:, :states] = slopes.reshape(states, count, -1).transpose(1, 0, 2)
         return np.hstack([nodes, self.log[:, entries:]]), slope
 
-    def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> Evaluation:
-        """Run all predictions; those that diverge give residuals that are not finite.
+    def evaluate(self, nodes: Array, factors: Array, nuisances: Array) -> tuple[Array, Array]:
+        """Weighted residuals (S, N ny) of all predictions; where one diverges they are not finite.
+
+        And their derivatives (S, N ny, nc) to initial state, factors and nuisances.
 
         nodes : (S, nn) initial states. factors : (n,). nuisances : (R, nq) [SI].
         """
-        model, count = self.problem.model, len(self)
+        model, count = self.problem.model, len(self.run)
         num_nodes, num_states = len(model.node), len(model.states)
         num_signals, split = len(self.problem.layout.signals), num_states * (1 + model.num_columns)
         x = np.zeros((count, model.size))
@@ -344,7 +315,7 @@ class Predictions:
             record = self._run(x, fixed)
         r = record[..., :num_signals].reshape(-1, self.length * num_signals)[:count]
         R = record[..., num_signals:].reshape(*record.shape[:3], -1, num_signals).swapaxes(3, 4)
-        return Evaluation(r, R.reshape(-1, r.shape[1], R.shape[4])[:count])
+        return r, R.reshape(-1, r.shape[1], R.shape[4])[:count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -457,11 +428,11 @@ def predict_residuals(
         away = np.zeros_like(measured)
     if away.size:
         begun = measured + width * problem.node_scale * away
-    evaluation = whole.evaluate(begun, factors, q)
+    r, slopes = whole.evaluate(begun, factors, q)
     num_nodes, n, num_signals = len(problem.model.node), len(problem.layout.groups), len(problem.layout.signals)
-    keep = (whole.weight > 0).reshape(len(whole), -1)
+    keep = (whole.weight > 0).reshape(len(whole.run), -1)
     where, place = np.nonzero(keep)
-    R = evaluation.R[keep]  # (m, nc)
+    R = slopes[keep]  # (m, nc)
     by_q, by_start = R[:, num_nodes + n :], R[:, :num_nodes]
     if by_q.size:
         with np.errstate(all="ignore"):
@@ -471,12 +442,12 @@ def predict_residuals(
         factors=factors,
         nuisances=nuisances,
         away=away,
-        r=evaluation.r[keep],
+        r=r[keep],
         by_factor=np.hstack([R[:, num_nodes : num_nodes + n], problem.common_width * by_q[:, problem.common]]),
         by_nuisance=by_q * problem.widths,
         by_start=by_start * (problem.node_scale * width) if away.size else by_start[:, :0],
         segment=where,
         run=whole.run[where],
-        time=np.repeat(whole.time, num_signals, axis=1).reshape(len(whole), -1)[keep],
+        time=np.repeat(whole.time, num_signals, axis=1).reshape(len(whole.run), -1)[keep],
         signals=np.array(problem.layout.signals)[place % num_signals],
     )

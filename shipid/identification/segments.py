@@ -52,7 +52,7 @@ def cut_segments(
     step: float,
     horizon: float,
     lags: int = 0,
-    parameters_of_run: Mapping[str, Mapping[str, float]] | None = None,
+    overrides: Mapping[str, Mapping[str, float]] | None = None,
     commands: Changes = "held",
 ) -> list[ShootingSegment]:
     """Cut runs into consecutive segments of `horizon` [s]; 0: one segment for each unbroken stretch.
@@ -60,7 +60,7 @@ def cut_segments(
     Each begins at the last row that the segment before it holds; one at the end has at least half a horizon.
 
     step : of the integrator [s]. lags : number of earlier command values to keep.
-    parameters_of_run : run -> path -> value, overrides that the actuator simulation of that run uses.
+    overrides : run -> values of `resolve_overrides`: of parameters, for its actuators, and of the environment.
     commands : `held` from each row to the next, or changing `between` rows.
 
     Raises DataError for an unknown run, a command that was not recorded, a run without a long enough stretch or with
@@ -75,16 +75,11 @@ def cut_segments(
         recorded = ", ".join(dataset.commands) or "none"
         raise DataError(f"{vessel.name} needs this command; the data have {recorded}", path=missing)
     result = []
-    vessels = {
-        run: vessel.with_values(values) if values else vessel for run, values in (parameters_of_run or {}).items()
-    }
     table = {name: dataset.frame[name].to_numpy() for name in map(str, dataset.frame.columns) if name != "run"}
     for run, places in stretch_rows(dataset):
         if run in runs:
-            rows = {name: values[places] for name, values in table.items()}
-            result += _cut_segments(
-                vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags, commands
-            )
+            rows, own = {name: values[places] for name, values in table.items()}, (overrides or {}).get(run, {})
+            result += _cut_segments(vessel, rows, own, list(runs).index(run), step, horizon, lags, commands)
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
         wanted = _shortest_segment(step, horizon)
@@ -126,6 +121,7 @@ def near_a_row(t: Array, instants: Array, step: float) -> NDArray[np.bool_]:
 def _cut_segments(
     vessel: Vessel,
     rows: Mapping[str, NDArray[Any]],
+    overrides: Mapping[str, float],
     run: int,
     step: float,
     horizon: float,
@@ -147,7 +143,9 @@ def _cut_segments(
     elif step <= COARSE * float(np.median(np.diff(t))):
         columns |= held_over_steps(vessel, rows, grid, step)
     commands = {name: columns[name] for name in vessel_dynamics(vessel).commands}
-    memory = memory_along(vessel, commands, grid) or {}
+    numbers = {path: x for path, x in overrides.items() if path in vessel.parameters}
+    memory = memory_along(vessel.with_values(numbers) if numbers else vessel, commands, grid) or {}
+    columns |= {path.partition(".")[2]: np.full(len(grid), overrides[path]) for path in overrides.keys() - numbers}
     result, begin = [], 0
     beginnings = measured & ~is_without_rows(t, grid, step)  # a state between two rows is no beginning
     while begin < count:

@@ -133,7 +133,12 @@ class Variation:
 
 
 class _Ship:
-    """Symbols of all inputs of a layout, and the ship's equations in these symbols."""
+    """Symbols of all inputs of a layout, and the ship's equations in these symbols.
+
+    moving, seen : unknowns that change the motion (factors, then nuisances), and nuisances that only the measurement
+    shows. fixed, known : inputs that are constant along a run, and those of every step: commands, weather, and actuator
+    states that are not integrated. now : commands and weather at the instant of a measured output, if one is fitted.
+    """
 
     def __init__(self, layout: FitLayout) -> None:
         model = layout.model
@@ -145,7 +150,13 @@ class _Ship:
         self.weather = SX.sym("weather", len(layout.weather))
         self.memory = SX.sym("memory", len(model.memory))
         self.names = (*model.state, *model.hidden)
-        self.value_of = dict(zip(layout.nuisances, ca.vertsplit(self.q) if layout.nuisances else [], strict=True))
+        each, moving = ca.vertsplit(self.q) if layout.nuisances else [], layout.num_moving
+        self.value_of = dict(zip(layout.nuisances, each, strict=True))
+        self.moving, self.seen = ca.vertcat(self.theta, *each[:moving]), ca.vertcat(SX(0, 1), *each[moving:])
+        self.fixed = ca.vertcat(self.theta, self.q, self.base, self.scale)
+        given = [] if layout.carried else [SX.sym("given", self.memory.shape[0])]  # goes in as the memory
+        self.known = ca.vertcat(self.commands, self.weather, *given)
+        self.now = ca.vertcat(self.commands, self.weather) if layout.outputs else SX(0, 1)
         commands = _delay_commands(layout, self.commands, self.value_of)
         environment = _environment_channels(layout, self.weather, self.value_of)
         parameters = _scaled_parameters(layout, self.base, self.scale, self.theta, self.value_of)
@@ -156,31 +167,6 @@ class _Ship:
             for part, names in ((self.memory, model.memory), (commands, model.commands))
         )
         self.inputs = [memory, actual, environment, parameters]
-
-    @property
-    def moving(self) -> SX:
-        """Unknowns that change the motion: factors, then nuisances."""
-        return ca.vertcat(self.theta, *self._nuisances[: self.layout.num_moving])
-
-    @property
-    def seen(self) -> SX:
-        """Unknowns that change only the measurement: the other nuisances."""
-        return ca.vertcat(SX(0, 1), *self._nuisances[self.layout.num_moving :])
-
-    @property
-    def _nuisances(self) -> list[SX]:
-        return ca.vertsplit(self.q) if self.layout.nuisances else []
-
-    @property
-    def fixed(self) -> SX:
-        """Inputs that are constant along a run."""
-        return ca.vertcat(self.theta, self.q, self.base, self.scale)
-
-    @property
-    def known(self) -> SX:
-        """Inputs of every step: commands, weather, and actuator states that are not integrated."""
-        given = [] if self.layout.carried else [SX.sym("given", self.memory.shape[0])]  # goes in as the memory
-        return ca.vertcat(self.commands, self.weather, *given)
 
     def rates(self, state: SX) -> SX:
         """d(state)/dt of the whole state, in calm water."""
@@ -200,11 +186,6 @@ class _Ship:
         return _sensed_signals(
             self.layout.signals, dict(zip(names, ca.vertsplit(values), strict=True)) | shown, self.value_of
         )
-
-    @property
-    def now(self) -> SX:
-        """Commands and weather at the instant of a measured output; nothing if no output is fitted."""
-        return ca.vertcat(self.commands, self.weather) if self.layout.outputs else SX(0, 1)
 
 
 @lru_cache(maxsize=32)

@@ -128,18 +128,19 @@ class Identify(CheckedModel, BaseModel):
     def _known(self) -> Identify:
         for name in self.weights:
             if name not in WEIGHTED and not is_output(name):
-                outputs = (
-                    f"or a measured output, <component>.<signal> with a signal of {', '.join(rows_of_role('output'))}"
+                outputs = ", ".join(rows_of_role("output"))
+                raise ValueError(
+                    f"weights.{name} is no valid name: {suggest_name(name, WEIGHTED)} (or a measured output, "
+                    f"<component>.<signal> with a signal of {outputs})"
                 )
-                raise ValueError(f"weights.{name} is no valid name: {suggest_name(name, WEIGHTED)} ({outputs})")
-        unknown = next((name for name in self.nuisance if name not in NUISANCES), None)
-        if unknown is not None:
-            raise ValueError(f"nuisance.{unknown} is no valid name: {suggest_name(unknown, NUISANCES)}")
+        for name in self.nuisance:
+            if name not in NUISANCES:
+                raise ValueError(f"nuisance.{name} is no valid name: {suggest_name(name, NUISANCES)}")
         for path, (low, high) in self.bounds.items():
-            if math.isnan(low) or math.isnan(high):
-                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] lacks a number: give [low, high], or inf")
-            if low > high:
-                raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] has low above high: give [low, high]")
+            if not low <= high:
+                raise ValueError(
+                    f"bounds.{path}: [{low:g}, {high:g}] are no two rising numbers: give [low, high], or inf"
+                )
         if self.commands == "between" and self.outputs:
             message = "'between' is not for measured outputs, which belong to the command of their row"
             raise ValueError(f"commands: {message}: leave weights.{self.outputs[0]} out, or write 'held'")
@@ -241,7 +242,10 @@ def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
             raise DocumentError(message, path=error.path) from None
 
     selected = chosen(settings.parameters, "parameters")
-    asked = _without_dimensions(selected, settings)
+    known = measured_constants(selected, settings)
+    if known == set(selected):
+        message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
+        raise DocumentError(message, path=f"{BLOCK}.parameters")
 
     def reached(pattern: str, key: str, among: Collection[str]) -> list[str]:
         paths = [path for path in chosen([pattern], key) if path in among]
@@ -253,7 +257,7 @@ def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
         return paths
 
     fixed = {path for pattern in settings.fixed for path in reached(pattern, "fixed", selected)}
-    free = [path for path in asked if path not in fixed]
+    free = [path for path in selected if path not in fixed | known]
     if not free:
         raise DocumentError(
             "every selected parameter is also fixed, so none is left to estimate: fix fewer",
@@ -279,11 +283,9 @@ def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
     key = _VesselKey(vessel.digest, vessel)
     low = np.array([max(_smallest_factor(key, path) for path in group) for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
-    if settings.ranges:
-        for i, group in enumerate(groups):
-            for path in group:
-                least, most = plausible_factors(vessel, path)
-                low[i], high[i] = max(low[i], least), min(high[i], most)
+    for path, i in place.items() if settings.ranges else ():
+        least, most = plausible_factors(vessel, path)
+        low[i], high[i] = max(low[i], least), min(high[i], most)
     for pattern, limits in settings.bounds.items():
         for path in reached(pattern, "bounds", place):
             low[place[path]], high[place[path]] = limits  # as the user says, also below 0
@@ -321,14 +323,6 @@ def measured_constants(asked: Sequence[str], settings: Identify) -> set[str]:
     }
 
 
-def _without_dimensions(asked: Sequence[str], settings: Identify) -> list[str]:
-    known = measured_constants(asked, settings)
-    if known == set(asked):
-        message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
-        raise DocumentError(message, path=f"{BLOCK}.parameters")
-    return [path for path in asked if path not in known]
-
-
 @dataclass(frozen=True)
 class _VesselKey:
     """A vessel as a key of a cache: two are equal if their documents have one digest."""
@@ -357,14 +351,11 @@ def _accepts_value(vessel: Vessel, path: str, value: float) -> bool:
 def _factor_groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str, ...]]:
     of: dict[str, int] = {}
     for number, patterns in enumerate(settings.together):
-        key = f"together.{number}"
-        for path in chosen(patterns, key):
-            if path not in free:
-                message = f"{path} is tied but not free: add it to parameters, or untie it"
-                raise DocumentError(message, path=f"{BLOCK}.{key}")
-            if path in of:
-                message = f"{path} is in two groups: tie all of them in one"
-                raise DocumentError(message, path=f"{BLOCK}.{key}")
+        for path in chosen(patterns, f"together.{number}"):
+            if path not in free or path in of:
+                bound = "is tied but not free: add it to parameters, or untie it"
+                message = f"{path} {bound if path not in free else 'is in two groups: tie all of them in one'}"
+                raise DocumentError(message, path=f"{BLOCK}.together.{number}")
             of[path] = number
     groups: dict[Any, list[str]] = {}
     for path in free:

@@ -14,15 +14,29 @@ from numpy.typing import NDArray
 from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
-from shipid.identification.covariance import invert_information
-from shipid.identification.diagnosis import diagnose
-from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_factors, initial_point, search_factors
+from shipid.identification.diagnosis import diagnose, fit_forces
+from shipid.identification.fit import (
+    BEGIN,
+    Point,
+    Progress,
+    Result,
+    Solution,
+    evaluate_factors,
+    initial_point,
+    search_factors,
+)
 from shipid.identification.late import COARSE, row_interval
 from shipid.identification.residuals import CURRENT, Problem, build_problem, typical_errors
-from shipid.identification.settings import BLOCK, ENVIRONMENT, NUISANCES, Identify, run_overrides, weighted_columns
-from shipid.identification.solution import Solution
-from shipid.identification.start import by_inverse_dynamics, grow_horizon
-from shipid.identification.statistics import LinearFit, residual_whiteness
+from shipid.identification.segments import ShootingSegment
+from shipid.identification.settings import (
+    BLOCK,
+    ENVIRONMENT,
+    NUISANCES,
+    Identify,
+    run_overrides,
+    weighted_columns,
+)
+from shipid.identification.statistics import Basis, residual_whiteness, restrict_fit
 from shipid.units import percent_text, significant_digits
 from shipid.vessel.load import Vessel
 
@@ -34,6 +48,10 @@ HALVINGS = 3  # of the default step, at most, as `study new` does
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
 UNEVEN = 0.01  # of the time between rows: a difference above it counts
 FAR = 0.05  # of the time in which a ship goes her length: between rows so far apart, lines miss how she turns
+LOOSE = 1.0  # base values: widest prior of a start by inverse dynamics
+HORIZONS = (2.0, 5.0, 15.0, 60.0)  # s
+ENOUGH = 20000  # steps of all predictions of a short horizon: more take time and change a start little
+ROUGH, MOST = 1e-3, 25  # tolerance and evaluations of a short horizon
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
 """Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
@@ -88,7 +106,7 @@ def identify(
 
 def _discount_residuals(solution: Solution) -> tuple[Identify, dict[str, float]]:
     """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
-    settings, seen = solution.settings, residual_whiteness(LinearFit.of(solution))
+    settings, seen = solution.settings, residual_whiteness(solution, Basis.of_none(solution))
     factors = {
         name: max(
             float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in weighted_columns(name)])),
@@ -198,7 +216,7 @@ def _fit_dropping_factors(
         problem = _hold_factor(problem, weakest, targets[weakest])
         dropped = (*solution.dropped, problem.unknown.paths[weakest])
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
-        result = search_factors(problem, factors, _result_point(result), progress, before=result.iterations)
+        result = search_factors(problem, factors, result.point, progress, before=result.iterations)
         solution = replace(
             _build_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped
         )
@@ -223,7 +241,7 @@ def _search_from_starts(
             begin, before, stopped = grow_horizon(problem, dataset, factors, progress, before)
             if stopped:
                 value = evaluate_factors(problem, begin, point)
-                return Result(begin, value.at, value.objective, before, "stopped"), objective_start
+                return Result(begin, value.at, value.point, value.objective, before, "stopped"), objective_start
         elif way == "inverse":
             try:
                 begin = by_inverse_dynamics(problem, dataset)
@@ -266,31 +284,21 @@ def _step_warning(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
 
 
 def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | None) -> tuple[Array, Point]:
-    """Initial factors within the bounds, and where nuisances and initial states begin."""
-    if not isinstance(start, Solution):
-        return _initial_factors(problem, start or {}), initial_point(problem)
-    begin = zip(start.paths, start.factors.tolist(), strict=True)
-    gone = NUISANCES["current"].keys() - set(problem.unknown.paths)  # the other fit may have chosen a current
-    factors = _initial_factors(problem, {path: factor for path, factor in begin if path not in gone})
-    one, other = start.point, initial_point(problem)
-    alike = one.nuisances.shape == other.nuisances.shape and one.away.shape == other.away.shape
-    return factors, one if alike else other
-
-
-def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
-    """Initial factors (n,) within the bounds: those in `start`, the others of the base vessel."""
-    unknown = problem.unknown
+    """Initial factors (n,) within the bounds, those in `start` or of the base, and where the unknowns of runs begin."""
+    unknown, point = problem.unknown, initial_point(problem)
+    if isinstance(start, Solution):
+        gone = NUISANCES["current"].keys() - set(unknown.paths)  # the other fit may have chosen a current
+        one, begin = start.point, zip(start.paths, start.factors.tolist(), strict=True)
+        start = {path: factor for path, factor in begin if path not in gone}
+        alike = one.nuisances.shape == point.nuisances.shape and one.away.shape == point.away.shape
+        point = one if alike else point
     factors = unknown.centre + np.array([BEGIN.get(path, 0.0) for path in unknown.paths])
-    for path, factor in start.items():
+    for path, factor in (start or {}).items():
         if path not in unknown.paths:
             message = f"{path!r} is not free in the fit: {suggest_name(path, unknown.paths)}"
             raise DocumentError(message, path=f"{BLOCK}.start")
         factors[unknown.paths.index(path)] = float(as_float_array(f"start of {path}", factor, DocumentError))
-    return np.asarray(np.clip(factors, unknown.low, unknown.high))
-
-
-def _result_point(result: Result) -> Point:
-    return Point(result.at.nuisances, result.at.away)
+    return np.asarray(np.clip(factors, unknown.low, unknown.high)), point
 
 
 def _build_solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
@@ -326,7 +334,12 @@ def _build_solution(problem: Problem, result: Result, objective_start: float, se
         sentence=sentence,
         at_bound=at_bound,
         held=unknown.low == unknown.high,
-        point=_result_point(result),
+        dropped=(),
+        sizes=tuple(
+            (scales[0], problem.vessel.units.get(path, "m/s"))
+            for path, scales in zip(unknown.paths, unknown.scale, strict=True)
+        ),
+        point=result.point,
         within=end.within(settings.linear_from),
     )
 
@@ -360,19 +373,76 @@ def _search_sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool
 
 def _weakest_factor(solution: Solution, threshold: float, targets: Array) -> int | None:
     """Index of the free factor with the smallest |factor - target| / standard error; None if above the threshold."""
-    information = solution.jacobian.T @ solution.jacobian + np.diag(1 / solution.prior_widths**2)
-    free = ~solution.held
-    if not free.any():
+    free = np.flatnonzero(~solution.held)
+    if not len(free):
         return None
-    level = (solution.residuals**2).sum() / max(1, len(solution.residuals) - free.sum())
-    inverse, unseen = invert_information(information[np.ix_(free, free)])
-    errors = np.where(unseen, np.inf, np.sqrt(np.diag(inverse) * level))
+    inner = restrict_fit(solution, free)
+    basis = Basis.of(inner)
+    level = (inner.residuals**2).sum() / max(1, len(inner.residuals) - len(free))
+    errors = np.where(basis.unseen, np.inf, np.sqrt(np.diag(basis.inverse) * level))
     away = np.abs(solution.factors - targets)[free] / np.maximum(errors, 1e-300)
     weakest = int(np.argmin(away))
-    return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None
+    return int(free[weakest]) if away[weakest] < threshold else None
 
 
 def _hold_factor(problem: Problem, number: int, target: float) -> Problem:
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
     return replace(problem, unknown=replace(problem.unknown, low=low, high=high))
+
+
+def grow_horizon(
+    problem: Problem, dataset: Dataset, factors: Array, progress: Progress | None = None, before: int = 0
+) -> tuple[Array, int, bool]:
+    """Initial factors by fits over growing horizons, each shorter than the horizon of the fit.
+
+    Returns factors (n,), number of iterations including those `before`, and whether `progress` asked to stop.
+    """
+    longest = max(segment.num_steps for segment in problem.segments) * problem.settings.step
+    iterations = before
+    for horizon in HORIZONS:
+        steps = max(2, round(horizon / problem.settings.step))
+        if steps * problem.settings.step >= longest:
+            break
+        result = _fit_at_horizon(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
+        if result is None or not np.isfinite(result.objective):
+            continue
+        factors, iterations = result.factors, result.iterations
+        if result.status == "stopped":
+            return factors, iterations, True
+    return factors, iterations, False
+
+
+def _fit_at_horizon(
+    problem: Problem, dataset: Dataset, factors: Array, horizon: float, progress: Progress | None, before: int
+) -> Result | None:
+    """Result of the fit with a shorter horizon [s]; None if the runs cannot be cut into such segments."""
+    widths = {name: width for name, width in problem.settings.widths.items() if name != "initial_state"}
+    settings = problem.settings.model_copy(update={"horizon": horizon, "nuisance": widths})
+    try:
+        short = build_problem(problem.vessel, dataset, problem.runs, settings)
+    except DataError:
+        return None
+    short = replace(short, unknown=problem.unknown, segments=_spread_segments(short))
+    return search_factors(short, factors, initial_point(short), progress, before=before, tolerance=ROUGH, most=MOST)
+
+
+def _spread_segments(problem: Problem) -> tuple[ShootingSegment, ...]:
+    """A subset of the segments at equal distances, at least one of every run, with about `ENOUGH` steps in all."""
+    steps = sum(segment.num_steps for segment in problem.segments)
+    every = max(1, round(steps / ENOUGH))
+    runs = [[one for one in problem.segments if one.run == run] for run in range(len(problem.runs))]
+    return tuple(one for of_run in runs for one in of_run[::every])
+
+
+def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
+    """Initial factors (n,) with which the forces explain the measured motion, clipped to the bounds."""
+    unknown, vessel, own = problem.unknown, problem.vessel, len(problem.layout.groups)
+    place = {path: number for number, path in enumerate(vessel.parameters)}
+    spread = np.zeros((len(place), own))
+    for j, group in enumerate(problem.layout.groups):
+        spread[[place[path] for path in group], j] = unknown.scale[j]
+    widths = np.minimum(unknown.prior[:own], LOOSE)
+    factors = fit_forces(vessel, dataset, problem.runs, spread, unknown.centre[:own], widths)
+    factors = np.append(factors, [BEGIN[path] for path in unknown.paths[own:]])
+    return np.asarray(np.clip(factors, unknown.low, unknown.high))

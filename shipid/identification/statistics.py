@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,12 +35,10 @@ from scipy.special import chdtrc, chdtri, stdtrit
 
 from shipid.document import short_names
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Combination, collinear_sets
-from shipid.identification.covariance import invert_information
+from shipid.identification.collinearity import Combination, collinear_sets, invert_information
 from shipid.units import join_names, significant_digits
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
 _Part = tuple[Array, Array, Array]  # of a cluster: singular values of J_g R, those of A_g J_g R, directions (k, n)
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -67,44 +65,38 @@ KEPT = 1e-4  # of I - H: directions that a cluster alone decides have no residua
 class LinearFit:
     """Linearisation of a fit at its estimate, as plain arrays; m residuals, n parameters.
 
-    paths, factors : names and estimates (n,), factors on the base values. centre : (n,) of the base: 0 where that is 0.
-    residuals : (m,) predicted less measured over the declared standard deviation; of each run in the order of time.
-    jacobian : (m, n) d residual / d factor, per-run nuisances projected out. clusters, signals : of each residual.
+    paths, factors : name and estimate (n,) of each factor on the base values; the name of a tied group is its first
+    path. centre : (n,) of the base: 0 where that is 0.
+    residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
+    time. With huber those of `Prediction.marginal`.
+    jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
+    clusters, signals : (m,) number of the run and column of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
     at_bound : (n,) estimates at a bound. held : (n,) factors that were not free. Neither has an interval.
-    dropped : paths of held factors that the drop test removed. runs : name of each run number, or empty.
-    sizes : of each factor of 1 the value and its unit, or empty: how intervals are told where the base is 0.
+    dropped : paths of held factors that the drop test removed. runs : name of each run number.
+    sizes : value [SI] of the parameter at each factor of 1, or of a current of all runs [m/s], and its unit, (n,).
     """
 
     paths: tuple[str, ...]
     factors: Array
     residuals: Array
     jacobian: Array
-    clusters: Index
+    clusters: NDArray[np.intp]
     signals: tuple[str, ...]
-    prior_widths: Array | None = None
-    spent: Array | None = None
-    at_bound: NDArray[np.bool_] | None = None
-    held: NDArray[np.bool_] | None = None
-    dropped: tuple[str, ...] = ()
-    runs: tuple[str, ...] = ()
-    centre: Array | None = None
-    sizes: tuple[tuple[float, str], ...] = ()
+    prior_widths: Array
+    spent: Array
+    at_bound: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    dropped: tuple[str, ...]
+    runs: tuple[str, ...]
+    centre: Array
+    sizes: tuple[tuple[float, str], ...]
 
-    @classmethod
-    def of(cls, solution: Any) -> LinearFit:
-        """The linearisation in what has attributes of these names, such as a solution of `identify`."""
-        return cls(**{name: getattr(solution, name) for name in cls.__dataclass_fields__})
-
-    def __post_init__(self) -> None:
-        m, n = self.jacobian.shape
-        if not (len(self.residuals) == len(self.clusters) == len(self.signals) == m and len(self.factors) == n):
-            raise ShipidError(f"residuals, clusters and signals must be ({m},) and factors ({n},), as the jacobian is")
-        if not (np.isfinite(self.residuals).all() and np.isfinite(self.jacobian).all()):
-            raise ShipidError("residuals and sensitivities must be finite: the prediction diverges at the estimate")
-        if m <= n:
-            raise ShipidError(f"{m} residuals are too few to estimate the errors of {n} parameters: use more data")
+    @property
+    def free(self) -> NDArray[np.intp]:
+        """Places of the factors that are neither held nor at a bound."""
+        return np.flatnonzero(~(self.at_bound | self.held))
 
 
 @dataclass(frozen=True)
@@ -164,14 +156,19 @@ class Covariance:
 class Statistics:
     """Uncertainty of the n factors; infinite for factors that the data do not determine.
 
+    inner : the fit of the factors that are neither held nor at a bound alone, with its `basis`. by_data : their
+    estimates without the priors.
     chosen : form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 % intervals.
     alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST` and neither the
     interval without the priors nor the one with them holds 0, no effect.
-    sentences : the result in words, one for each factor. correlations : (n, n). free : paths of the factors that are
-    neither held nor at a bound. combinations : sets of these that the data do not distinguish.
+    sentences : the result in words, one for each factor. correlations : (n, n). combinations : sets of free factors
+    that the data do not distinguish.
     """
 
     fit: LinearFit
+    inner: LinearFit
+    basis: Basis
+    by_data: Array
     covariances: Mapping[Kind, Covariance]
     chosen: Kind
     errors: Array
@@ -181,9 +178,13 @@ class Statistics:
     correlations: Array
     identifiable: NDArray[np.bool_]
     sentences: tuple[str, ...]
-    free: tuple[str, ...]
     combinations: tuple[Combination, ...]
     whiteness: Mapping[str, Whiteness]
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Paths of the factors that are neither held nor at a bound."""
+        return self.inner.paths
 
     @property
     def information(self) -> Array:
@@ -199,27 +200,35 @@ def fit_statistics(fit: LinearFit) -> Statistics:
     A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values, and excludes no
     effect (0) with and without the priors; collinearity explains a wider one. The profile likelihood
     (`shipid.identification.profile`) shows whether that is finite.
+
+    Raises ShipidError for no free factor, fewer residuals than factors, or a prediction that diverges.
     """
-    free = _free_places(fit)
+    free, n = fit.free, len(fit.paths)
     if not len(free):
-        return _statistics_without_factors(fit)
-    inner = _restrict_fit(fit, free)
-    basis = _Basis.of(inner)
+        raise ShipidError(_no_estimate_reason(fit))
+    if not (np.isfinite(fit.residuals).all() and np.isfinite(fit.jacobian).all()):
+        raise ShipidError("residuals and sensitivities must be finite: the prediction diverges at the estimate")
+    if len(fit.residuals) <= n:
+        raise ShipidError(
+            f"{len(fit.residuals)} residuals are too few to estimate the errors of {n} parameters: use more data"
+        )
+    inner = restrict_fit(fit, free)
+    basis = Basis.of(inner)
     colours = residual_whiteness(inner, basis)
     covariances = _covariance_forms(inner, basis, colours)
-    chosen: Kind = next(
-        (kind for kind in KINDS if kind in covariances and covariances[kind].trusted), _fallback_covariance(covariances)
-    )
+    chosen: Kind = next((kind for kind in KINDS if kind in covariances and covariances[kind].trusted), "blocks")
+    if not covariances[chosen].trusted and covariances[chosen].clusters == 1:
+        chosen = "fisher"  # the scores of one block sum to 0
     best = covariances[chosen]
-    half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
-    errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
-    by_data, alone = _estimates_without_priors(inner, half)
+    vague = basis.unseen & ~np.isfinite(inner.prior_widths)
+    half, errors = np.where(vague, np.inf, best.half_widths), np.where(vague, np.inf, best.errors)
+    by_data, alone = inner.factors, half
+    if np.isfinite(inner.prior_widths).any():
+        seen = fit_statistics(_by_data_alone(inner))
+        by_data, alone = seen.fit.factors, (seen.high - seen.low) / 2
     together = collinear_sets(inner.jacobian, inner.paths)
-    n = len(fit.paths)
-    full = {
-        name: _fill_infinite(values, free, n)
-        for name, values in {"errors": errors, "half": half, "alone": alone}.items()
-    }
+    wide = np.full((3, n), np.inf)
+    wide[:, free] = errors, half, alone
     identifiable = np.zeros(n, dtype=bool)
     identifiable[free] = (alone <= WIDEST) & (np.abs(by_data) > alone) & (np.abs(inner.factors) > half)
     correlations = np.eye(n)
@@ -228,104 +237,85 @@ def fit_statistics(fit: LinearFit) -> Statistics:
     np.fill_diagonal(correlations, 1.0)
     return Statistics(
         fit=fit,
+        inner=inner,
+        basis=basis,
+        by_data=by_data,
         covariances=covariances,
         chosen=chosen,
-        errors=full["errors"],
-        low=fit.factors - full["half"],
-        high=fit.factors + full["half"],
-        alone=full["alone"],
+        errors=wide[0],
+        low=fit.factors - wide[1],
+        high=fit.factors + wide[1],
+        alone=wide[2],
         correlations=correlations,
         identifiable=identifiable,
-        sentences=_factor_sentences(fit, full["half"], full["alone"], identifiable, together),
-        free=inner.paths,
+        sentences=_factor_sentences(fit, wide[1], wide[2], identifiable, together),
         combinations=together,
         whiteness=colours,
     )
 
 
-def _fallback_covariance(covariances: Mapping[Kind, Covariance]) -> Kind:
-    """Form to report if none is trusted: `block_clusters`; `fisher_covariance` for one block, whose scores sum to 0."""
-    blocks = covariances.get("blocks")
-    return "blocks" if blocks is None or blocks.clusters > 1 else "fisher"
+def _no_estimate_reason(fit: LinearFit) -> str:
+    remedy = "give a smaller drop, or runs that excite them more"
+    if not fit.dropped:
+        return "every parameter is at a bound or fixed: free more parameters, or widen bounds"
+    if len(fit.dropped) == len(fit.paths):
+        return f"every parameter was dropped, because the data do not support a change of any: {remedy}"
+    return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
 
 
-def _statistics_without_factors(fit: LinearFit) -> Statistics:
-    n = len(fit.paths)
-    none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
-    covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free")
-    sentences = _factor_sentences(fit, wide, wide, fixed, ())
-    low, high, levels = fit.factors - wide, fit.factors + wide, residual_whiteness(fit)
-    return Statistics(
-        fit, {"fisher": covariance}, "fisher", wide, low, high, wide, np.eye(n), fixed, sentences, (), (), levels
-    )
-
-
-def _free_places(fit: LinearFit) -> Index:
-    """Columns of the factors that are neither held nor at a bound."""
-    fixed = np.zeros(len(fit.paths), dtype=bool)
-    for mask in (fit.at_bound, fit.held):
-        fixed |= False if mask is None else mask
-    return np.flatnonzero(~fixed)
-
-
-def _restrict_fit(fit: LinearFit, free: Index) -> LinearFit:
-    widths = _interval_half_widths(fit)[free]
-    paths = tuple(fit.paths[j] for j in free)
-    return LinearFit(
-        paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent,
-        runs=fit.runs,
-    )  # fmt: skip
-
-
-def _interval_half_widths(fit: LinearFit) -> Array:
-    return np.full(len(fit.paths), np.inf) if fit.prior_widths is None else np.asarray(fit.prior_widths, dtype=float)
-
-
-def _fill_infinite(values: Array, free: Index, count: int) -> Array:
-    """Array (count,) with `values` at the indices `free` and infinity elsewhere."""
-    full = np.full(count, np.inf)
-    full[free] = values
-    return full
+def restrict_fit(fit: LinearFit, free: NDArray[np.intp]) -> LinearFit:
+    """The fit of some of its factors."""
+    of_factor = {name: getattr(fit, name)[free] for name in ("factors", "prior_widths", "at_bound", "held", "centre")}
+    paths, sizes = tuple(fit.paths[j] for j in free), tuple(fit.sizes[j] for j in free)
+    return replace(fit, paths=paths, sizes=sizes, jacobian=fit.jacobian[:, free], **of_factor)
 
 
 @dataclass(frozen=True)
-class _Basis:
+class Basis:
     """A = J^T J + Lambda, inverted with columns scaled to unit length.
 
     inverse : (n, n), 0 along the null directions of A. prior : (n,) precisions of the priors.
     leverage : (m,) diagonal of J A^-1 J^T. unseen : (n,) parameters with a component along a null direction.
-    held : (n,) parameters with a prior.
     """
 
     inverse: Array
     prior: Array
     leverage: Array
     unseen: NDArray[np.bool_]
-    held: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, fit: LinearFit) -> _Basis:
-        prior = 1 / _interval_half_widths(fit) ** 2
+    def of(cls, fit: LinearFit) -> Basis:
+        """The basis of all factors of a fit."""
+        prior = 1 / fit.prior_widths**2
         inverse, unseen = invert_information(fit.jacobian.T @ fit.jacobian + np.diag(prior))
         leverage = np.einsum("mi,ij,mj->m", fit.jacobian, inverse, fit.jacobian)
-        return cls(inverse, prior, leverage, unseen, prior > 0)
+        return cls(inverse, prior, leverage, unseen)
+
+    @classmethod
+    def of_none(cls, fit: LinearFit) -> Basis:
+        """The basis of a fit all of whose factors are known."""
+        m, n = fit.jacobian.shape
+        return cls(np.zeros((n, n)), np.zeros(n), np.zeros(m), np.zeros(n, dtype=bool))
 
 
-def residual_whiteness(fit: LinearFit, basis: _Basis | None = None) -> dict[str, Whiteness]:
-    """Autocorrelation and level of the residuals of each signal; basis : of the parameters; default: none is free."""
-    taken = np.zeros(len(fit.residuals)) if basis is None else basis.leverage
-    taken = taken + (0.0 if fit.spent is None else fit.spent)
-    labels = np.array(fit.signals)
-    result = {}
+def residual_whiteness(fit: LinearFit, basis: Basis) -> dict[str, Whiteness]:
+    """Autocorrelation and level of the residuals of each signal."""
+    taken, labels, result = basis.leverage + fit.spent, np.array(fit.signals), {}
     for name in dict.fromkeys(fit.signals):
         selected = labels == name
         freedom = max(float(selected.sum() - taken[selected].sum()), 1.0)
         level = float(np.sqrt((fit.residuals[selected] ** 2).sum() / freedom))
-        runs = [np.flatnonzero(selected & (fit.clusters == run)) for run in np.unique(fit.clusters[selected])]
+        runs = runs_of_signal(fit, name)
         drift = _signal_drift(fit, runs, basis)
         probability, memory = _correlation_of_runs([fit.residuals[run] for run in runs], drift)
         result[name] = Whiteness(probability, memory, int(selected.sum()), level, freedom, drift.hidden)
     return result
+
+
+def runs_of_signal(fit: LinearFit, name: str) -> list[NDArray[np.intp]]:
+    """Rows of the residuals of a signal in each run that has some."""
+    selected = np.array(fit.signals) == name
+    return [np.flatnonzero(selected & (fit.clusters == run)) for run in np.unique(fit.clusters[selected])]
 
 
 def _correlation_of_runs(runs: Sequence[Array], drift: _Drift) -> tuple[float, float]:
@@ -355,59 +345,47 @@ def _correlation_of_runs(runs: Sequence[Array], drift: _Drift) -> tuple[float, f
 
 @dataclass(frozen=True)
 class _Drift:
-    """Means over quarters of runs of one signal, z = Q e, whose covariance under white errors is C = Q (I - H) Q^T.
+    """What the means over quarters of runs of one signal show that white errors would not.
 
-    H = J A^-1 J^T. z^T z has the mean tr C and the variance 2 tr C^2; it is judged as chi squared, with Satterthwaite's
-    degrees of freedom. A drift that adds x to the variance of the means of errors adds x tr C^2.
+    z = Q e has the covariance C = Q (I - H) Q^T under white errors, H = J A^-1 J^T; z^T z has the mean tr C and the
+    variance 2 tr C^2, and is judged as chi squared, with Satterthwaite's degrees of freedom. A drift that adds x to the
+    variance of the means of errors adds x tr C^2.
 
-    total : z^T z over the variance of the residuals. expected, squares : tr C and tr C^2, 0 where no run has quarters.
+    probability : of means as large as these, or larger, under white errors.
+    ratio : variance of a mean of errors over that of white ones, 1 + 2 sum (1 - k / n) rho_k for n rows.
+    hidden : what a drift adds to this ratio if every second fit overlooks it.
     """
 
-    total: float
-    expected: float
-    squares: float
-
-    @property
-    def probability(self) -> float:
-        """Of means as large as these, or larger, under white errors."""
-        if not self.squares:
-            return 1.0
-        return float(chdtrc(self.expected**2 / self.squares, self.total * self.expected / self.squares))
-
-    @property
-    def ratio(self) -> float:
-        """Variance of a mean of errors over that of white ones, 1 + 2 sum (1 - k / n) rho_k for n rows."""
-        return 1 + (self.total - self.expected) / self.squares if self.squares else 1.0
-
-    @property
-    def hidden(self) -> float:
-        """What a drift adds to this ratio if every second fit overlooks it."""
-        if not self.squares:
-            return 0.0
-        freedom = self.expected**2 / self.squares
-        return float(chdtri(freedom, WHITE / 2) / freedom - 1) * self.expected / self.squares
+    probability: float = 1.0
+    ratio: float = 1.0
+    hidden: float = 0.0
 
 
-def _run_quarters(run: Index) -> list[Index]:
+def _run_quarters(run: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Rows of each quarter of a run of one signal; none if it is too short."""
     return np.array_split(run, QUARTERS) if len(run) >= QUARTERS * LEAST_ROWS else []
 
 
-def _signal_drift(fit: LinearFit, runs: Sequence[Index], basis: _Basis | None) -> _Drift:
+def _signal_drift(fit: LinearFit, runs: Sequence[NDArray[np.intp]], basis: Basis) -> _Drift:
     """The means of one signal; runs : rows of each. So a small drift counts that no single correlation shows."""
     total, means = 0.0, []
     for run in runs:
         square = float(fit.residuals[run] @ fit.residuals[run])
-        left = len(run) - (0.0 if basis is None else float(basis.leverage[run].sum()))
+        left = len(run) - float(basis.leverage[run].sum())
         for part in _run_quarters(run) if square > 0 else []:
             total += float(fit.residuals[part].sum()) ** 2 / len(part) * max(left, 1.0) / square
             means.append(fit.jacobian[part].sum(axis=0) / len(part) ** 0.5)
-    count = float(len(means))
-    if basis is None or not means:
-        return _Drift(total, count, count)
+    if not means:
+        return _Drift()
     taken = basis.inverse @ (np.transpose(means) @ np.array(means))
     once, twice = float(np.trace(taken)), float(np.sum(taken * taken.T))
-    return _Drift(total, max(count - once, KEPT), max(count - 2 * once + twice, KEPT**2))
+    expected, squares = max(len(means) - once, KEPT), max(len(means) - 2 * once + twice, KEPT**2)
+    freedom = expected**2 / squares
+    return _Drift(
+        float(chdtrc(freedom, total * expected / squares)),
+        1 + (total - expected) / squares,
+        float(chdtri(freedom, WHITE / 2) / freedom - 1) * expected / squares,
+    )
 
 
 def pooled_autocorrelation(runs: Sequence[Array]) -> Array:
@@ -430,7 +408,7 @@ def _autocovariance_sums(run: Array) -> Array:
     return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(run, 2 * size)) ** 2)[:size]) if run.any() else np.zeros(size)
 
 
-def _covariance_forms(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
+def _covariance_forms(fit: LinearFit, basis: Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
     """The Fisher and sandwich forms, and the block form if neither is trusted."""
     colours = _effective_whiteness(fit, basis, colours)
     result: dict[Kind, Covariance] = {"fisher": fisher_covariance(fit, basis, colours)}
@@ -444,7 +422,7 @@ def _covariance_forms(fit: LinearFit, basis: _Basis, colours: Mapping[str, White
     return result
 
 
-def _effective_whiteness(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[str, Whiteness]:
+def _effective_whiteness(fit: LinearFit, basis: Basis, colours: Mapping[str, Whiteness]) -> dict[str, Whiteness]:
     """Whiteness by signal; white where its correlation changes no standard error, as the yaw rate of straight runs."""
     labels, effect = np.array(fit.signals), (fit.jacobian @ basis.inverse) ** 2
     parts = {name: colour.level**2 * effect[labels == name].sum(axis=0) for name, colour in colours.items()}
@@ -457,7 +435,7 @@ def _effective_whiteness(fit: LinearFit, basis: _Basis, colours: Mapping[str, Wh
     }
 
 
-def fisher_covariance(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
+def fisher_covariance(fit: LinearFit, basis: Basis, colours: Mapping[str, Whiteness]) -> Covariance:
     """Covariance for errors of each signal that have one level, and are correlated in time as its residuals are."""
     labels = np.array(fit.signals)
     parts, freedoms = [], []
@@ -474,7 +452,7 @@ def fisher_covariance(fit: LinearFit, basis: _Basis, colours: Mapping[str, White
     return Covariance("fisher", matrix, _satterthwaite_freedom(total, np.asarray(squares)), not coloured, reason)
 
 
-def _of_signal(fit: LinearFit, basis: _Basis, rows: NDArray[np.bool_], colour: Whiteness) -> tuple[Array, float]:
+def _of_signal(fit: LinearFit, basis: Basis, rows: NDArray[np.bool_], colour: Whiteness) -> tuple[Array, float]:
     """Covariance (n, n) that the errors of one signal make, and the degrees of freedom of their level.
 
     Errors k samples apart have the correlation a^k of a first-order process with the integrated correlation time of the
@@ -503,42 +481,27 @@ def _apply_correlation(values: Array, a: float) -> Array:
     return np.asarray(np.fft.irfft(spectrum, 2 * size, axis=0)[:size])
 
 
-def declared_error(fit: LinearFit, path: str) -> float:
-    """Standard error of one factor for independent residuals with the declared standard deviations."""
-    inner = _restrict_fit(fit, _free_places(fit))
-    inverse = _Basis.of(inner).inverse
-    j = inner.paths.index(path)
-    return float(np.sqrt(inverse[j, j]))
-
-
-def against_priors(fit: LinearFit) -> dict[str, tuple[float, float, float]]:
+def against_priors(judged: Statistics) -> dict[str, tuple[float, float, float]]:
     """Factors whose prior the data contradict: path -> width of the prior, and factor with half-width of data alone.
 
     By one step of Gauss-Newton without priors: `CONTRARY` standard deviations of prior and data from the centre.
     """
-    inner = _restrict_fit(fit, _free_places(fit))
-    centre = np.ones(len(fit.paths)) if fit.centre is None else fit.centre
-    widths, centre = _interval_half_widths(inner), centre[_free_places(fit)]
-    if not np.isfinite(widths).any():
-        return {}
-    seen = fit_statistics(_by_data_alone(inner))
-    factors, half = seen.fit.factors, (seen.high - seen.low) / 2
+    inner, half = judged.inner, judged.alone[judged.fit.free]
     errors = half / stdtrit(np.inf, 0.5 + LEVEL / 2)
-    far = np.abs(factors - centre) > CONTRARY * np.hypot(widths, errors)
-    return {inner.paths[j]: (float(widths[j]), float(factors[j]), float(half[j])) for j in np.flatnonzero(far)}
+    far = np.abs(judged.by_data - inner.centre) > CONTRARY * np.hypot(inner.prior_widths, errors)
+    return {
+        inner.paths[j]: (float(inner.prior_widths[j]), float(judged.by_data[j]), float(half[j]))
+        for j in np.flatnonzero(far)
+    }
 
 
-def factors_of_single_runs(fit: LinearFit) -> dict[str, str]:
+def factors_of_single_runs(judged: Statistics) -> dict[str, str]:
     """Factors that one run of several decides alone: path -> name of the run. Others do not show their errors."""
-    inner, numbers = _restrict_fit(fit, _free_places(fit)), np.unique(fit.clusters)
-    if len(numbers) < 2 or not fit.runs:
-        return {}
-    inverse = _Basis.of(inner).inverse
-    parts = np.array([((inner.jacobian[fit.clusters == number] @ inverse) ** 2).sum(axis=0) for number in numbers])
-    whole = np.where(parts.sum(axis=0) > 0, parts.sum(axis=0), np.inf)
-    most = parts.argmax(axis=0)
-    alone = parts.max(axis=0) / whole > ALONE
-    return {path: fit.runs[numbers[most[j]]] for j, path in enumerate(inner.paths) if alone[j]}
+    fit, numbers = judged.inner, np.unique(judged.fit.clusters)
+    effect = (fit.jacobian @ judged.basis.inverse) ** 2
+    parts = np.array([effect[fit.clusters == number].sum(axis=0) for number in numbers])
+    alone = (parts.max(axis=0) > ALONE * parts.sum(axis=0)) & (len(numbers) > 1)
+    return {fit.paths[j]: fit.runs[numbers[parts[:, j].argmax()]] for j in np.flatnonzero(alone)}
 
 
 def open_to_drift(judged: Statistics) -> dict[str, float]:
@@ -546,12 +509,11 @@ def open_to_drift(judged: Statistics) -> dict[str, float]:
 
     It is the drift that half of such fits overlook (`Whiteness.hidden`).
     """
-    inner = _restrict_fit(judged.fit, _free_places(judged.fit))
-    effect, labels = inner.jacobian @ _Basis.of(inner).inverse, np.array(inner.signals)
-    added = np.zeros(len(inner.paths))
+    inner, added = judged.inner, np.zeros(len(judged.free))
+    effect = inner.jacobian @ judged.basis.inverse
     for name, colour in judged.whiteness.items():
-        runs = [np.flatnonzero((labels == name) & (inner.clusters == run)) for run in np.unique(inner.clusters)]
-        means = [effect[part].sum(axis=0) / len(part) ** 0.5 for run in runs for part in _run_quarters(run)]
+        quarters = [part for run in runs_of_signal(inner, name) for part in _run_quarters(run)]
+        means = [effect[part].sum(axis=0) / len(part) ** 0.5 for part in quarters]
         added += colour.level**2 * colour.hidden * np.square(means).sum(axis=0)
     stated = judged.covariances["fisher"].errors ** 2
     times = np.sqrt(1 + added / np.where(stated > 0, stated, np.inf))
@@ -563,7 +525,7 @@ def _satterthwaite_freedom(total: Array, squares: Array) -> Array:
     return np.asarray(np.where(squares > 0, total**2 / np.where(squares > 0, squares, 1.0), 1e9))
 
 
-def sandwich_covariance(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: str) -> Covariance:
+def sandwich_covariance(fit: LinearFit, basis: Basis, clusters: NDArray[np.intp], kind: Kind, what: str) -> Covariance:
     """Cluster-robust covariance by the jackknife (CR3) with Satterthwaite's degrees of freedom."""
     root, parts, scores = _matrix_root(basis.inverse), [], []
     for number in np.unique(clusters):
@@ -628,9 +590,9 @@ def _freedom_of_scores(parts: Sequence[_Part], weights: Array) -> float:
     return float((diagonal.sum() - taken.sum()) ** 2 / squares) if squares > 0 else 1.0
 
 
-def block_clusters(fit: LinearFit, length: float) -> Index:
+def block_clusters(fit: LinearFit, length: float) -> NDArray[np.intp]:
     """Clusters (m,) of about `length` samples each: runs cut into equal stretches of the same times for all signals."""
-    labels, result, count = np.array(fit.signals), np.zeros(len(fit.residuals), dtype=np.int64), 0
+    labels, result, count = np.array(fit.signals), np.zeros(len(fit.residuals), dtype=np.intp), 0
     for run in np.unique(fit.clusters):
         most = 1
         for name in dict.fromkeys(fit.signals):
@@ -645,51 +607,38 @@ def block_clusters(fit: LinearFit, length: float) -> Index:
 def _by_data_alone(fit: LinearFit) -> LinearFit:
     step = -invert_information(fit.jacobian.T @ fit.jacobian)[0] @ (fit.jacobian.T @ fit.residuals)
     left = fit.residuals + fit.jacobian @ step
-    return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=None)
+    none = np.full(len(step), np.inf)
+    return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=none)
 
 
-def _estimates_without_priors(fit: LinearFit, half: Array) -> tuple[Array, Array]:
-    """Factors (n,) and half-widths (n,) without priors, by the form of that fit; half : (n,) those with them.
-
-    Every factor is free.
-    """
-    if not np.isfinite(_interval_half_widths(fit)).any():
-        return fit.factors, half
-    seen = fit_statistics(_by_data_alone(fit))
-    return seen.fit.factors, np.asarray((seen.high - seen.low) / 2)
-
-
-def _width_inflation(fit: LinearFit, free: Index) -> Array:
-    """How many times wider the interval of each factor (n,) is than if all others were known."""
-    information, times = fit.jacobian[:, free].T @ fit.jacobian[:, free], np.ones(len(fit.paths))
-    if len(free):
-        times[free] = np.sqrt(np.maximum(np.diag(invert_information(information)[0]) * np.diag(information), 1.0))
+def _width_inflation(fit: LinearFit) -> Array:
+    """How many times wider the interval of each factor (n,) is than if all other free ones were known."""
+    free, times = fit.free, np.ones(len(fit.paths))
+    information = fit.jacobian[:, free].T @ fit.jacobian[:, free]
+    times[free] = np.sqrt(np.maximum(np.diag(invert_information(information)[0]) * np.diag(information), 1.0))
     return times
 
 
 def _factor_sentences(
     fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], sets: Sequence[Combination]
 ) -> tuple[str, ...]:
-    free, sentences = _free_places(fit), list[str]()
-    shared = _width_inflation(fit, free)
+    shared, sentences = _width_inflation(fit), list[str]()
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in sets if path in combination.paths), None)
-        of_base = fit.centre is None or fit.centre[j] or not fit.sizes
-        size, unit = (100.0, "% of its base value") if of_base else fit.sizes[j]
+        size, unit = (100.0, "% of its base value") if fit.centre[j] else fit.sizes[j]
         known = f"{name} is known to +-{significant_digits(abs(size) * half[j], 2)} {unit}"
         if path in fit.dropped:
             sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
-        elif fit.held is not None and fit.held[j]:
+        elif fit.held[j]:
             sentences.append(f"{name} was held at {fit.factors[j]:.4g}: no interval")
-        elif j not in free:
+        elif fit.at_bound[j]:
             sentences.append(f"{name} is at its bound, {fit.factors[j]:.4g}: no interval")
-        elif identifiable[j] and together is None:
-            sentences.append(known)
-        elif identifiable[j]:
-            assert together is not None
+        elif identifiable[j] and together is not None:
             others = join_names([other for other in together.names if other != name])
             index = f"collinearity index {together.gamma:.0f}"
             sentences.append(f"{known}, if the model is right: {others} do nearly the same ({index})")
+        elif identifiable[j]:
+            sentences.append(known)
         elif together is not None:
             sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):

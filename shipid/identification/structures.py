@@ -13,17 +13,18 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from shipid import document as documents
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
-from shipid.identification.inverse import force_equations
 from shipid.identification.settings import Identify, measured_constants, without_zeros
 from shipid.physics.signals import is_steering
-from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.perturb import select_paths
 
@@ -109,11 +110,11 @@ class HullExchange:
 
 def check_structures(names: Sequence[str]) -> None:
     """Raise ShipidError for an unknown structure, or for one that is named twice."""
-    valid = (PRESENT, *STRUCTURES)
-    for number, name in enumerate(names):
-        if name not in valid:
-            raise ShipidError(f"{name!r} is no structure: {suggest_name(name, valid)}", path="structures")
-        if name in names[:number]:
+    for name in names:
+        if name not in (PRESENT, *STRUCTURES):
+            hint = suggest_name(name, (PRESENT, *STRUCTURES))
+            raise ShipidError(f"{name!r} is no structure: {hint}", path="structures")
+        if names.count(name) > 1:
             raise ShipidError(f"{name!r} is named twice", path="structures")
 
 
@@ -217,6 +218,28 @@ def _sample_states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dic
     return result
 
 
+@lru_cache(maxsize=16)
+def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
+    """(state, memory, commands, environment, parameters) -> F, dF/d free.
+
+    The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.
+    """
+    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
+    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
+    parameters, dof = ca.SX.sym("parameters", len(model.parameters)), model.num_dof
+    tau = ca.SX.sym("tau", dof)
+    total = tau
+    for term in model.sums:
+        for entry in () if term.arrays is None else term.arrays:
+            total = total + term.function(*inputs, parameters, entry)
+    acceleration = model.rates(*inputs, parameters, total)[dof : 2 * dof]
+    mass = ca.inv(ca.densify(ca.jacobian(acceleration, tau)))
+    force = mass @ ca.substitute(acceleration, tau, ca.SX.zeros(dof))
+    theta = ca.vertcat(*(parameters[i] for i in free))
+    result = [force, ca.densify(ca.jacobian(force, theta))]
+    return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
+
+
 def _hull_forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], zero: bool) -> tuple[Array, Array]:
     """Surge, sway and yaw force (3, N) [N, N m] at rest of everything else, and its derivatives (3, N, n) to `free`.
 
@@ -232,7 +255,7 @@ def _hull_forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str
         for group in ((*model.state, *model.hidden), tuple(model.memory), model.commands, model.environment)
     ]
     mapped = function.map("forces", "serial", count, [function.n_in() - 1], [])
-    force, slopes, *_ = mapped(*inputs, values)
+    force, slopes = mapped(*inputs, values)
     rows = [model.state[model.num_dof :].index(name) for name in ("u", "v", "r")]
     by_free = np.array(slopes).reshape(model.num_dof, count, len(free))
     return np.array(force)[rows], by_free[rows]

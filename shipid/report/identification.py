@@ -97,7 +97,9 @@ class IdentificationContent(PageContent):
     [rad/s], position [m].
     series : run, piece, t [s], model (`measured`, `before`, `after`), north, east [m], psi [rad], u, v [m/s], r
     [rad/s].
-    ahead : length of a free run [s], 0 for whole runs. manoeuvres : manoeuvre, measure, unit, before, after, note.
+    unseen : sentences that explain unidentified parameters. held_out : runs of the set `test`.
+    ahead : length of a free run [s], 0 for whole runs. manoeuvres : manoeuvre, measure, unit, before, after, note; with
+    a band also low and high.
     colours : signal, lag [s], correlation of the residuals. profiles : path, factor, rise, limit, sentence.
     beyond : manoeuvres that go farther than the data.
     programme : manoeuvre, hours, gain [bit], per_hour, narrows, before, after.

@@ -20,7 +20,18 @@ from shipid.units import digit_decimals
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StructuresContent(PageContent):
-    """Everything the page shows; the frames are those of `shipid.study.structures.StructureComparison`."""
+    """Everything the page shows.
+
+    errors : `structure`, `set` (`folds`, `test`), `run` (`all` at first), RMS `u`, `v` [m/s], `r` [rad/s], `position`
+        [m] of runs that the fit has not seen.
+    table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
+        runs; `more`, `low`, `high`: difference of the position to the chosen one with its interval; `equal`: whether
+        it is not shown to be worse, corrected for how many there are (Holm), and says something; `note`.
+    manoeuvres : `manoeuvre`, `measure`, `unit`, `structure`, `value`, `low`, `high`, `note`.
+    spread : `manoeuvre`, `measure`, `unit`, `least`, `greatest` over the structures that are equally good, `spread`
+        and `width`, the greatest width of the interval within one of them.
+    cautions : structure -> why its intervals may mislead. ahead : length of a free run [s], 0: whole runs.
+    """
 
     sentences: Sequence[str]
     table: pd.DataFrame

@@ -43,7 +43,7 @@ from shipid.units import percent_text
 from shipid.version import __version__
 
 if TYPE_CHECKING:
-    from shipid.identification.solution import Solution
+    from shipid.identification.fit import Solution
 
 
 NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms", "A_end", "A_end_90"), np.nan)  # of no physics

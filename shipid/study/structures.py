@@ -9,8 +9,7 @@ manoeuvres: those that are as good on the runs may differ there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,25 +23,32 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
-from shipid.identification.bands import Measure, band_refusal, check_level, measure_bands
-from shipid.identification.free_run import ALL, FreeRuns, check_length, simulate_free_runs, with_current
+from shipid.identification.bands import (
+    Reach,
+    Trial,
+    band_refusal,
+    check_level,
+    data_reach,
+    extrapolation_sentence,
+    measure_bands,
+    of_log,
+    perform_trials,
+    select_measures,
+)
+from shipid.identification.fit import Solution
+from shipid.identification.free_run import ALL, ERRORS_OF, FreeRuns, check_length, simulate_free_runs
 from shipid.identification.outcome import (
-    ERRORS_OF,
     TRIED,
     pick_runs,
-    residual_spacing,
     unrecorded_time_warning,
     warn_of_unmeasured_inputs,
     without_shared,
 )
-from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LEVEL, LinearFit, Statistics, fit_statistics
+from shipid.identification.statistics import LEVEL, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
 from shipid.report.structures import StructuresContent
-from shipid.simulation.measured import MeasuredManoeuvre, measure_all
 from shipid.study.new import proposed_horizon
 from shipid.study.survey import survey_dataset
 from shipid.version import __version__
@@ -67,23 +73,13 @@ class FittedStructure:
     caution: str
 
 
-@dataclass(frozen=True, eq=False)
-class StructureComparison:
-    """Result of a comparison of structures.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StructureComparison(StructuresContent):
+    """Result of a comparison of structures: the content of its page, and more.
 
-    vessel : the base. runs, test : of the folds, and held out of all. shared : warnings of runs that share moments with
-        those held out. ahead : length of a free run [s], 0: whole runs.
-    errors : `structure`, `set` (`folds`, `test`), `run` (`all` at first), RMS `u`, `v` [m/s], `r` [rad/s], `position`
-        [m] of runs that the fit has not seen.
-    table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
-        runs; `more`, `low`, `high`: difference of the position to the chosen one with its interval; `equal`: whether
-        it is not shown to be worse, corrected for how many there are (Holm), and says something; `note`.
-    fits : structure -> the fit to all runs; structures that could not be fitted are missing.
-    manoeuvres : `manoeuvre`, `measure`, `unit`, `structure`, `value`, `low`, `high`, `note`.
-    spread : `manoeuvre`, `measure`, `unit`, `least`, `greatest` over the structures that are equally good, `spread`
-        and `width`, the greatest width of the interval within one of them.
-    uninformative : structure -> why it is left out of the spread: a length of a manoeuvre whose interval holds 0.
-    beyond : sentences on manoeuvres that go farther than the data.
+    vessel : the base. runs, test : of the folds, and held out of all. digest : of the dataset. shared : warnings of
+    runs that share moments with those held out. fits : structure -> the fit to all runs; structures that could not be
+    fitted are missing.
     """
 
     vessel: Vessel
@@ -91,43 +87,18 @@ class StructureComparison:
     test: tuple[str, ...]
     digest: str
     shared: tuple[str, ...]
-    ahead: float
-    level: float | None
-    errors: pd.DataFrame
-    table: pd.DataFrame
-    chosen: str
     fits: Mapping[str, FittedStructure]
-    manoeuvres: pd.DataFrame
-    spread: pd.DataFrame
-    uninformative: Mapping[str, str]
-    beyond: tuple[str, ...]
 
-    @property
-    def sentences(self) -> list[str]:
-        """The structure chosen, the reason, and notes."""
-        rows = {str(row["structure"]): row for row in self.table.to_dict("records")}
-        others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
-        notes = [
-            f"structure {self.chosen} has the least error of the position over "
-            f"{f'{self.ahead:g} s' if self.ahead else 'whole runs'} on runs that the fit has not seen: "
-            f"{rows[self.chosen]['position']:.3g} m"
-        ]
-        if len(self.runs) < FEWEST_RUNS:
-            notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
-        elif others:
-            notes.append(f"not shown to be worse: {', '.join(others)}")
-        elif self.table["low"].notna().any() and not self.uninformative:
-            notes.append("all others that could be judged are shown to be worse")
-        notes += [f"left out of the spread: {name}, {why}" for name, why in self.uninformative.items()]
-        wide = [row for row in self.spread.to_dict("records") if row["spread"] > row["width"]]
-        if wide:
-            worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
-            notes.append(
-                "structures differ by more than the interval within one in "
-                f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
-                f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
-            )
-        return [*notes, *self.beyond]
+    def page(self, dataset: str | Path, command: str = "") -> StructureComparison:
+        """The content of a page; dataset : file of the runs. command : command line that reproduces the comparison."""
+        origin = {
+            "Vessel": f"{self.vessel.name}, digest {self.vessel.digest}",
+            "Dataset": f"{dataset}, digest {self.digest}",
+            "Runs": ", ".join(self.runs),
+            "Held out of all": ", ".join(self.test) or "none",
+            "shipid": __version__,
+        }
+        return replace(self, provenance=origin, command=command, study_document=self.document())
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
@@ -216,7 +187,11 @@ def compare_structures(
     silent = uninformative_structures(manoeuvres)
     for name in silent.keys() - {chosen}:
         table.loc[table["structure"] == name, ["equal", "note"]] = False, silent[name]
+    spread = _spread_of_measures(manoeuvres, [name for name in equal if name not in silent])
     return StructureComparison(
+        title=f"{vessel.name}: structures of the hull",
+        name=vessel.key,
+        sentences=_comparison_sentences(table, spread, silent, fitted, length, far),
         vessel=vessel,
         runs=fitted,
         test=tested,
@@ -233,10 +208,44 @@ def compare_structures(
         chosen=chosen,
         fits=fits,
         manoeuvres=manoeuvres,
-        spread=_spread_of_measures(manoeuvres, [name for name in equal if name not in silent]),
-        uninformative=silent,
-        beyond=far,
+        spread=spread,
+        cautions={name: fit.caution for name, fit in fits.items()},
     )
+
+
+def _comparison_sentences(
+    table: pd.DataFrame,
+    spread: pd.DataFrame,
+    silent: Mapping[str, str],
+    runs: Sequence[str],
+    ahead: float,
+    beyond: Sequence[str],
+) -> list[str]:
+    """The structure chosen, the reason, and notes. silent : structures left out of the spread, and why."""
+    best, *rest = table.to_dict("records")
+    others = [str(row["structure"]) for row in rest if row["equal"]]
+    length = f"{ahead:g} s" if ahead else "whole runs"
+    notes = [
+        f"structure {best['structure']} has the least error of the position over {length} on runs that the fit has not "
+        f"seen: {best['position']:.3g} m"
+    ]
+    if len(runs) < FEWEST_RUNS:
+        notes.append(f"{len(runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
+    elif others:
+        notes.append(f"not shown to be worse: {', '.join(others)}")
+    elif table["low"].notna().any() and not silent:
+        notes.append("all others that could be judged are shown to be worse")
+    notes += [f"left out of the spread: {name}, {why}" for name, why in silent.items()]
+    wide = spread[spread["spread"] > spread["width"]]
+    if len(wide):
+        share = wide["spread"] / wide[["least", "greatest"]].abs().max(axis=1)
+        worst = wide.iloc[int(share.argmax())]
+        notes.append(
+            f"structures differ by more than the interval within one in {len(wide)} of {len(spread)} measures, most in "
+            f"the {worst['measure']} of {worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} "
+            f"{worst['unit']}"
+        )
+    return [*notes, *beyond]
 
 
 def check_comparison(
@@ -293,9 +302,7 @@ def _errors_and_fit(
 
     def replay(ship: Vessel, found: Solution, runs: Sequence[str]) -> FreeRuns:
         """Free runs, in the current of all runs that was estimated with the vessel."""
-        flows = any(found.common_current)
-        sea, known = with_current(ship, settings, runs, found.common_current) if flows else (ship, settings)
-        return simulate_free_runs({name: sea}, dataset, runs, known, ahead)
+        return simulate_free_runs({name: ship}, dataset, runs, settings, ahead, {name: found.common_current})
 
     whole, solution = fit(fitted, ())
     frames = []
@@ -307,9 +314,8 @@ def _errors_and_fit(
     if tested:
         test = replay(whole, solution, tested)
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
-    judged = fit_statistics(LinearFit.of(solution))
-    caution = band_refusal(solution, judged, residual_spacing(solution))
-    return errors, FittedStructure(whole, solution, judged, caution)
+    judged = fit_statistics(solution)
+    return errors, FittedStructure(whole, solution, judged, band_refusal(solution, judged))
 
 
 def _with_mean(errors: pd.DataFrame) -> pd.DataFrame:
@@ -375,76 +381,40 @@ def with_actuators_on(vessel: Vessel) -> Vessel:
     return vessel.with_values(off) if off else vessel
 
 
-STANDARD_TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES_OF_TRIALS]
-TRIAL_TITLES = [
-    f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}" for kind, angles, side in STANDARD_TRIALS
-]
-
-
-def _perform_trials(vessel: Vessel) -> dict[str, MeasuredManoeuvre]:
-    """Title -> every standard manoeuvre that the vessel can perform."""
-    ship, done = with_actuators_on(vessel), dict[str, MeasuredManoeuvre]()
-    try:
-        return dict(zip(TRIAL_TITLES, measure_all(ship, STANDARD_TRIALS, engine="repeated"), strict=True))
-    except ShipidError as error:  # one of them: the others may be performed
-        for trial, title in zip(STANDARD_TRIALS, TRIAL_TITLES, strict=True):
-            with suppress(ShipidError):
-                done[title] = measure_all(ship, [trial], engine="repeated")[0]
-        if not done:
-            raise error
-        return done
+STANDARD_TRIALS: dict[str, Trial] = {
+    f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}": (kind, angles, side)
+    for kind, angles in TRIED
+    for side in SIDES_OF_TRIALS
+}
 
 
 def _manoeuvre_table(
     fits: Mapping[str, FittedStructure], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one extrapolates."""
+
+    def perform(vessel: Vessel) -> dict[str, dict[str, float]]:
+        return select_measures(with_actuators_on(vessel), STANDARD_TRIALS, MEASURES_SHOWN)
+
     rows, far = list[dict[str, Any]](), list[str]()
     for name, fit in fits.items():
-        try:
-            done = _perform_trials(fit.vessel)
-        except ShipidError as error:
-            rows.append({"manoeuvre": "all", "measure": "", "structure": name, "note": error.message})
-            continue
+        done, refused = perform_trials(with_actuators_on(fit.vessel), STANDARD_TRIALS)
+        refused = refused if done else {"all": next(iter(refused.values()))}
         units = {row["measure"]: row["unit"] for one in done.values() for row in one.measures}
         if name == chosen:
             far += [extrapolation_sentence(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
-        if level is None or name not in equal:
-            frames: list[Any] = [
-                {"manoeuvre": title, "measure": measure, "value": value}
-                for title, one in done.items()
-                for measure, value in _compared_values(one).items()
-            ]
-        else:
-            known = {fit.vessel.digest: done}
-            measures = [(title, _measures_of_trial(title, known)) for title in done]
-            frames = measure_bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level).to_dict(
-                "records"
-            )
-        missing = {"measure": "", "structure": name, "note": "diverges"}
-        rows += [{"manoeuvre": title, **missing} for title in TRIAL_TITLES if title not in done]
+        frames: list[Any] = [
+            {"manoeuvre": title, **{key: row[key] for key in ("measure", "value")}}
+            for title, one in done.items()
+            for row in one.measures
+            if row["measure"] in MEASURES_SHOWN[one.standard.kind]
+        ]
+        if level is not None and name in equal:
+            frames = measure_bands(fit.solution.vessel, fit.solution, fit.statistics, perform, level).to_dict("records")
+        frames += [{"manoeuvre": title, "measure": "", "note": note} for title, note in refused.items()]
         rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]
     columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
     return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
-
-
-def _compared_values(one: MeasuredManoeuvre) -> dict[str, float]:
-    """The measures that are compared."""
-    measures = {row["measure"]: float(row["value"]) for row in one.measures}
-    return {name: measures[name] for name in MEASURES_SHOWN[one.standard.kind] if name in measures}
-
-
-def _measures_of_trial(title: str, known: dict[str, dict[str, MeasuredManoeuvre]]) -> Measure:
-    """Measures of one manoeuvre; `known` holds all manoeuvres of vessels by digest, which come from one approach."""
-
-    def measure(one: Vessel) -> dict[str, float]:
-        if one.digest not in known:
-            known[one.digest] = _perform_trials(one)
-        if title not in known[one.digest]:
-            raise ShipidError("diverges within the interval of the numbers")
-        return _compared_values(known[one.digest][title])
-
-    return measure
 
 
 def uninformative_structures(manoeuvres: pd.DataFrame) -> dict[str, str]:
@@ -466,29 +436,3 @@ def _spread_of_measures(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.Da
     )
     spread.insert(5, "spread", spread["greatest"] - spread["least"])
     return spread
-
-
-def structures_content(compared: StructureComparison, dataset: str | Path, command: str = "") -> StructuresContent:
-    """Assemble the page; `command` is the command line that reproduces it."""
-    return StructuresContent(
-        title=f"{compared.vessel.name}: structures of the hull",
-        name=compared.vessel.key,
-        sentences=compared.sentences,
-        table=compared.table,
-        errors=compared.errors,
-        manoeuvres=compared.manoeuvres,
-        spread=compared.spread,
-        chosen=compared.chosen,
-        cautions={name: fit.caution for name, fit in compared.fits.items()},
-        ahead=compared.ahead,
-        level=compared.level,
-        provenance={
-            "Vessel": f"{compared.vessel.name}, digest {compared.vessel.digest}",
-            "Dataset": f"{dataset}, digest {compared.digest}",
-            "Runs": ", ".join(compared.runs),
-            "Held out of all": ", ".join(compared.test) or "none",
-            "shipid": __version__,
-        },
-        command=command,
-        study_document=compared.document(),
-    )

@@ -27,12 +27,13 @@ from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.identification.bands import band_refusal
 from shipid.identification.bands import measure_bands as of_manoeuvres
-from shipid.identification.outcome import COMPARED, _measure_manoeuvre
+from shipid.identification.outcome import COMPARED
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, fit_statistics
+from shipid.identification.statistics import fit_statistics
 from shipid.metrics import coverage_by_run, coverage_share
 from shipid.predictor import limits_of
+from shipid.simulation.measured import measure_standard
 from shipid.study.plan import Batch, model_label, read_plan
 from shipid.study.prepare import instants_of, obtain_runs, partition, prepare
 from shipid.study.run import run_unit
@@ -314,11 +315,11 @@ def identified_figures(replicates: int = 30) -> dict[str, Any]:
             settings = Identify(parameters=paths, weights=coverage.NOISE, horizon=horizon,
                                 nuisance=["initial_state"], start="base", current="none")  # fmt: skip
             solution = identify(ship, data, data.runs, settings)
-            judged = fit_statistics(LinearFit.of(solution))
-            if band_refusal(solution, judged, 1.0):
+            judged = fit_statistics(solution)
+            if band_refusal(solution, judged):
                 refused += 1
                 continue
-            rows = of_manoeuvres(ship, solution, judged, [("all", measure)], 0.9)
+            rows = of_manoeuvres(ship, solution, judged, lambda one: {"all": measure(one)}, 0.9)
             right = rows["measure"].map(truth)
             held.append(((rows["low"] <= right) & (right <= rows["high"])).to_numpy())
         text = f"{np.mean(held):.3f}, worst measure {np.mean(held, axis=0).min():.3f}" if held else "-"
@@ -333,7 +334,7 @@ def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[
     def measure(one: Vessel) -> dict[str, float]:
         slopes = {}
         for kind, angles in (("zigzag", (20, 20)), ("turning", (35,))):
-            rows = _measure_manoeuvre(one, kind, angles)
+            rows = {row["measure"]: row for row in measure_standard(one, kind, angles, engine="repeated").measures}
             slopes |= {name: float(rows[name]["value"]) for name in COMPARED[kind]}
         return slopes
 

@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
+from shipid.identification.statistics import Statistics, fit_statistics
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
@@ -98,7 +98,7 @@ def _judged(vessel: Vessel, data: Dataset, horizon: float) -> Statistics | None:
     )
     begin = dict(zip(paths, (1 + 0.2 * np.sin(np.arange(len(paths)))).tolist(), strict=True))
     solution = identify(vessel, data, data.runs, settings, start=begin)
-    return fit_statistics(LinearFit.of(solution)) if solution.status == "ok" else None
+    return fit_statistics(solution) if solution.status == "ok" else None
 
 
 def _figures(judged: list[Statistics]) -> dict[str, Any]:

@@ -13,9 +13,9 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
+from shipid.identification.fit import Solution
 from shipid.identification.free_run import ALL, simulate_free_runs, with_current
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.simulation.approach import Controls, balanced_shaft
 from shipid.simulation.log import log_columns

@@ -15,8 +15,8 @@ import numpy as np
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import Trajectories, rollout
+from shipid.identification.fit import Solution
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,25 @@ def noise(rng: np.random.Generator, runs: int, samples: int, phi: float) -> np.n
     return (error * np.array([LEVELS[name] for name in SIGNALS])[:, None]).ravel()
 
 
+def linear_fit(
+    paths: Sequence[str],
+    factors: np.ndarray,
+    residuals: np.ndarray,
+    jacobian: np.ndarray,
+    clusters: np.ndarray,
+    signals: Sequence[str],
+    **more: Any,
+) -> LinearFit:
+    """A fit without nuisances, priors, bounds, held factors or factors about 0, but for what `more` says."""
+    m, n = jacobian.shape
+    plain: dict[str, Any] = {
+        "prior_widths": np.full(n, np.inf), "spent": np.zeros(m), "at_bound": np.zeros(n, dtype=bool),
+        "held": np.zeros(n, dtype=bool), "dropped": (), "runs": tuple(f"R{run}" for run in range(max(clusters) + 1)),
+        "centre": np.ones(n), "sizes": n * ((1.0, "m"),),
+    }  # fmt: skip
+    return LinearFit(tuple(paths), factors, residuals, jacobian, clusters, tuple(signals), **plain | more)
+
+
 def fitted(
     jacobian: np.ndarray, error: np.ndarray, clusters: np.ndarray, signals: tuple[str, ...], **more: Any
 ) -> LinearFit:
@@ -50,4 +70,4 @@ def fitted(
         np.vstack([jacobian, np.diag(np.sqrt(precision))]), np.append(error, 0 * precision), rcond=None
     )[0]
     paths = tuple(f"p{j}" for j in range(jacobian.shape[1]))
-    return LinearFit(paths, 1 + away, error - jacobian @ away, -jacobian, clusters, signals, **more)
+    return linear_fit(paths, 1 + away, error - jacobian @ away, -jacobian, clusters, signals, **more)

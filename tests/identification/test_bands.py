@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +10,11 @@ import pytest
 from scipy import stats
 
 from shipid.errors import DataError, ShipidError
-from shipid.identification.bands import band_refusal, measure_bands, principal_axes, short_horizon
+from shipid.identification.bands import Perform, band_refusal, measure_bands, principal_axes
+from shipid.identification.fit import Solution
 from shipid.identification.outcome import run_identification
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
+from shipid.identification.statistics import Statistics, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.test_outcome import FEW, NOISE, settings
 from tests.identification.trials import noisy, trials
@@ -30,10 +30,15 @@ def linear(vessel: Vessel) -> Mapping[str, float]:
     return {"one": value, "other": 10.0 - 1000.0 * value}
 
 
+def at_once(title: str, measure: Callable[[Vessel], Mapping[str, float]]) -> Perform:
+    """One manoeuvre with these measures."""
+    return lambda vessel: {title: measure(vessel)}
+
+
 def judged(seed: int) -> tuple[Solution, Statistics]:
     data = noisy(trials(SHIP, runs=5, steps=40), NOISE, seed)
     solution = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
-    return solution, fit_statistics(LinearFit.of(solution))
+    return solution, fit_statistics(solution)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +48,7 @@ def fitted() -> tuple[Solution, Statistics]:
 
 def test_of_a_linear_measure_it_is_the_propagated_covariance(fitted: tuple[Solution, Statistics]) -> None:
     solution, known = fitted
-    rows = measure_bands(SHIP, solution, known, [("all", linear)], 0.8).set_index("measure")
+    rows = measure_bands(SHIP, solution, known, at_once("all", linear), 0.8).set_index("measure")
     best = known.covariances[known.chosen]
     slopes = SLOPES[[FEW.index(path) for path in solution.paths]]
     deviation = np.sqrt(slopes @ best.matrix @ slopes)
@@ -51,7 +56,7 @@ def test_of_a_linear_measure_it_is_the_propagated_covariance(fitted: tuple[Solut
     assert rows["deviation"]["one"] == pytest.approx(deviation, rel=1e-3)
     assert (rows["high"]["one"] - rows["low"]["one"]) / 2 == pytest.approx(half, rel=1e-3)
     assert rows["high"]["other"] - rows["low"]["other"] == pytest.approx(2000 * half, rel=1e-3)
-    wider = measure_bands(SHIP, solution, known, [("all", linear)], 0.95).set_index("measure")
+    wider = measure_bands(SHIP, solution, known, at_once("all", linear), 0.95).set_index("measure")
     assert (wider["low"] < rows["low"]).all()
     assert (wider["high"] > rows["high"]).all()
 
@@ -71,19 +76,29 @@ def test_of_a_bent_measure_it_has_the_moments_of_a_normal_error(
         z = float(axis @ (factors - solution.factors)) / float(axis @ axis)
         return {"bent": 2 * z + bend * z**2}
 
-    row = measure_bands(SHIP, solution, known, [("one", bent)], 0.8).iloc[0]
+    row = measure_bands(SHIP, solution, known, at_once("one", bent), 0.8).iloc[0]
     half = np.sqrt(4.5) * stats.t.ppf(0.9, np.median(best.freedom))
     assert row["deviation"] == pytest.approx(np.sqrt(4.5), rel=1e-6)
     assert (row["low"], row["high"]) == pytest.approx((-half + min(bend, 0), half + max(bend, 0)), rel=1e-6)
 
 
-def test_a_manoeuvre_that_cannot_be_performed_says_why(fitted: tuple[Solution, Statistics]) -> None:
-    def never(_: Vessel) -> Mapping[str, float]:
-        raise ShipidError("no shaft speed gives it 9 m/s")
+def test_a_manoeuvre_that_cannot_be_performed_within_the_interval_says_so(fitted: tuple[Solution, Statistics]) -> None:
+    solution, known = fitted
+    centre = SHIP.with_values(solution.values).parameters
 
-    rows = measure_bands(SHIP, *fitted, [("fast", never), ("all", linear)])
-    assert rows["note"][0] == "no shaft speed gives it 9 m/s"
+    def perform(vessel: Vessel) -> Mapping[str, Mapping[str, float]]:
+        return ({"fast": linear(vessel)} if vessel.parameters == centre else {}) | {"all": linear(vessel)}
+
+    rows = measure_bands(SHIP, solution, known, perform)
+    assert rows["note"][0] == "diverges within the interval of the numbers"
     assert np.isfinite(rows["low"][1])
+
+    def refused(vessel: Vessel) -> Mapping[str, Mapping[str, float]]:
+        if vessel.parameters != centre:
+            raise ShipidError("no shaft speed gives it 9 m/s")
+        return {"fast": linear(vessel)}
+
+    assert measure_bands(SHIP, solution, known, refused)["note"].tolist() == ["no shaft speed gives it 9 m/s"]
 
 
 def test_short_horizons_with_coloured_residuals_are_refused(fitted: tuple[Solution, Statistics]) -> None:
@@ -91,18 +106,16 @@ def test_short_horizons_with_coloured_residuals_are_refused(fitted: tuple[Soluti
     coloured = {name: replace(one, memory=4.0, probability=0.0) for name, one in known.whiteness.items()}
     bad = replace(known, whiteness=coloured)
     short = replace(solution, settings=settings(horizon=20.0))
-    assert band_refusal(solution, known, 1.0) == ""
-    assert "the horizon of 20 s is short against residuals that are correlated over 4 s" in band_refusal(
-        short, bad, 1.0
-    )
-    assert short_horizon(replace(solution, settings=settings(horizon=50.0)), bad, 1.0) == ""
-    assert short_horizon(solution, bad, 1.0) == ""  # whole runs
+    assert band_refusal(solution, known) == ""
+    assert "the horizon of 20 s is short against residuals that are correlated over 4 s" in band_refusal(short, bad)
+    assert band_refusal(replace(solution, settings=settings(horizon=50.0)), bad) == ""
+    assert band_refusal(solution, bad) == ""  # whole runs
     best = replace(known.covariances[known.chosen], trusted=False, reason="3 runs")
     vague = replace(known, covariances={known.chosen: best})
-    assert band_refusal(solution, vague, 1.0) == "the standard errors are not to be trusted: 3 runs"
+    assert band_refusal(solution, vague) == "the standard errors are not to be trusted: 3 runs"
     silent = replace(known, errors=np.where(np.arange(len(FEW)) == 1, np.inf, known.errors))
     name = FEW[1].rpartition(".")[2]
-    assert band_refusal(solution, silent, 1.0) == f"the data do not determine {name}: give priors, or fix some"
+    assert band_refusal(solution, silent) == f"the data do not determine {name}: give priors, or fix some"
 
 
 def test_a_level_that_is_none_is_refused_before_the_fit() -> None:

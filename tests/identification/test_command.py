@@ -100,7 +100,7 @@ MISTAKES = {
     "endless free run": (["--parameters", ONE, "--ahead", "inf"], "must be a finite number"),
     "prior without width": (["--parameters", ONE, "--prior", "hull.*"], "--prior: 'hull.*': write paths=0.3"),
     "prior of no number": (["--parameters", ONE, "--prior", "hull.*=wide"], "write paths=0.3"),
-    "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "low above high"),
+    "bounds backwards": (["--parameters", ONE, "--bounds", f"{ONE}=[2, 1]"], "no two rising numbers"),
     "unknown nuisance": (["--parameters", ONE, "--nuisance", "currents"], "did you mean 'current'?"),
     "unknown key": (["--parameters", ONE, "--set", "horizn=3"], "unknown key: did you mean 'horizon'?"),
     "profile of what is not free": (["--parameters", ONE, "--profile", "inertia.m"], "is not free in the fit"),

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.identification.covariance import invert_information
+from shipid.identification.collinearity import invert_information
 from tests.drawn import seeds
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification import solve
+from shipid.identification.fit import Solution
 from shipid.identification.outcome import _next_manoeuvres, run_identification
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, fit_statistics
+from shipid.identification.statistics import fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, noisy, trials
 
@@ -171,7 +171,7 @@ def test_what_a_current_takes_away_is_not_known_of_the_numbers(monkeypatch: pyte
     monkeypatch.setattr("shipid.identification.design.rank_candidates", lambda *given: known.append(given[-1]))
     log = log_of(1, np.tile([0.3, 0.0], (6, 1))).select(["M01", "M02"])
     solution = fitted(log, current="one")
-    judged = fit_statistics(LinearFit.of(solution))
+    judged = fit_statistics(solution)
     _next_manoeuvres(SHIP.with_values(solution.values), log, log.runs, solution, judged)
     whole = judged.information + np.diag(solution.prior_widths**-2.0)
     np.testing.assert_allclose(np.linalg.inv(known[0]), np.linalg.inv(whole)[:3, :3], rtol=1e-6)

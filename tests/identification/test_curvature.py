@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from shipid.identification.curvature import MOST, Beside, curvature_sentence, curvature_warning, interval_end_ratios
 from shipid.identification.fit import local_linearisation
+from shipid.identification.profile import MOST, Beside, curvature_sentence, curvature_warning, interval_end_ratios
 from shipid.identification.residuals import build_problem
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
+from shipid.identification.statistics import Statistics, fit_statistics
 from shipid.vessel.load import load_vessel
 from tests.drawn import seeds
-from tests.identification.linear import design, fitted, labels, noise
+from tests.identification.linear import design, fitted, labels, linear_fit, noise
 from tests.identification.trials import noisy, trials
 
 Residuals = Callable[[np.ndarray], np.ndarray]
@@ -112,7 +112,7 @@ def test_the_fit_beside_the_estimate(more: dict[str, Any]) -> None:
     assert np.square(at(change)[0]).sum() - e @ e == pytest.approx(
         2 * e @ J @ change + np.square(J @ change).sum(), abs=1e-6
     )
-    judged = fit_statistics(LinearFit.of(solution))
+    judged = fit_statistics(solution)
     assert curvature_warning(solution, data, judged) == ""
     for times in interval_end_ratios(judged, at).values():
         np.testing.assert_allclose(times, 1.0, atol=0.1)
@@ -121,7 +121,7 @@ def test_the_fit_beside_the_estimate(more: dict[str, Any]) -> None:
 def _judged(paths: tuple[str, ...], factors: np.ndarray, at: Beside) -> Statistics:
     e, J = at(np.zeros(len(paths)))
     m = len(e)
-    return fit_statistics(LinearFit(paths, factors, e, J, np.zeros(m, dtype=int), ("u",) * m))
+    return fit_statistics(linear_fit(paths, factors, e, J, np.zeros(m, dtype=int), ("u",) * m))
 
 
 def _growth(t: np.ndarray, a: float, b: float, error: np.ndarray) -> tuple[Statistics, Beside]:

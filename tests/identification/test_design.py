@@ -10,7 +10,6 @@ import pytest
 from shipid.errors import ShipidError
 from shipid.identification.design import (
     InformedCandidate,
-    Limits,
     candidate_manoeuvres,
     information_of_candidates,
     information_where_possible,
@@ -120,9 +119,8 @@ def test_what_the_ship_cannot_perform_is_left_out_and_the_others_are_as_they_wer
 )
 def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, helm: float, rpm: float) -> None:
     assert manoeuvre.greatest_orders == pytest.approx((helm, rpm))
-    assert within_limits(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))
-    assert not within_limits(manoeuvre, Limits(angle_deg=helm, n_rpm=0.99 * rpm))
-    assert not helm or not within_limits(manoeuvre, Limits(angle_deg=0.99 * helm))
+    assert within_limits(manoeuvre, rpm)
+    assert not within_limits(manoeuvre, 0.99 * rpm)
     time = np.linspace(0, manoeuvre.length, 1000)
     assert np.abs(manoeuvre.helm(time)).max() <= np.radians(helm) + 1e-9
     assert np.abs(manoeuvre.shaft(time)).max() <= rpm / 60 + 1e-9
@@ -130,4 +128,4 @@ def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, hel
 
 def test_without_a_candidate_it_is_said() -> None:
     with pytest.raises(ShipidError, match="within the limits"):
-        information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], Limits(n_rpm=1.0)), SETTINGS)
+        information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], 1.0), SETTINGS)

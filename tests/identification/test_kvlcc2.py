@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.solution import Solution
+from shipid.identification.fit import Solution
 from shipid.units import DEGREE
 from tests.identification.kvlcc2 import (
     FITTED,

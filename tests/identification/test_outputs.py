@@ -16,7 +16,7 @@ from shipid.identification.outcome import _compare_outputs
 from shipid.identification.residuals import Problem, build_problem, predict_residuals
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, fit_statistics
+from shipid.identification.statistics import fit_statistics
 from shipid.simulation.manoeuvre import Excitation
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import Vessel, load_vessel
@@ -102,7 +102,7 @@ def errors(settings: Identify, data: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Factors, and their standard errors, of a fit that begins 20 % off."""
     solution = identify(tanker(), data, data.runs, settings, start=START)
     assert solution.status == "ok"
-    return solution.factors, fit_statistics(LinearFit.of(solution)).errors
+    return solution.factors, fit_statistics(solution).errors
 
 
 def test_measured_thrust_separates_the_propeller_from_the_resistance() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
+from shipid.identification.bands import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.simulation.manoeuvre import TurningCircle
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import DEGREE

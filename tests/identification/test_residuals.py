@@ -96,8 +96,7 @@ def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         nuisances = fit.centres + 0.5 * fit.widths * np.ones((3, 1))
         begun = side_by_side.begin(nuisances)[0]
         evaluated.append(side_by_side.evaluate(begun, np.full(fit.num_factors, 1.1), nuisances))
-    for key in ("r", "R"):
-        one, other = (getattr(each, key) for each in evaluated)
+    for one, other in zip(*evaluated, strict=True):
         assert np.abs(one - other).max() <= 1e-12 * (1 + np.abs(one).max())
 
 

@@ -12,12 +12,11 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.identification.fit import initial_point, search_factors
+from shipid.identification.fit import Solution, initial_point, search_factors
 from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, fit_statistics
+from shipid.identification.statistics import fit_statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.dynamics import vessel_dynamics
@@ -312,7 +311,7 @@ def test_standard_errors_of_huber_are_those_of_its_theory(sharper: float, bad: f
     density /= density.sum()
     variance = (density @ np.clip(x, -k, k) ** 2) / density[np.abs(x) <= k].sum() ** 2
     plain = np.sqrt(np.diag(np.linalg.inv(known.jacobian.T @ known.jacobian)))
-    errors = fit_statistics(LinearFit.of(solution)).covariances["fisher"].errors
+    errors = fit_statistics(solution).covariances["fisher"].errors
     np.testing.assert_allclose(errors / plain, np.sqrt(variance), rtol=0.15)
 
 
@@ -325,7 +324,7 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     assert [path for path, there in zip(solution.paths, solution.held, strict=True) if there] == [
         path for path in solution.paths if path in solution.dropped
     ]
-    judged = fit_statistics(LinearFit.of(solution))
+    judged = fit_statistics(solution)
     assert np.isinf(judged.errors[solution.held]).all()
     assert "dropped" in judged.sentences[solution.paths.index(solution.dropped[0])]
     for path in solution.dropped:
@@ -439,7 +438,7 @@ def test_mistakes_are_one_line(more: dict[str, object], words: str) -> None:
     ("more", "words"),
     [
         ({"nuisance": ["currant"]}, "did you mean 'current'"),
-        ({"bounds": {FEW[0]: (math.nan, 2.0)}}, r"\[nan, 2\] lacks a number: give \[low, high\]"),
+        ({"bounds": {FEW[0]: (math.nan, 2.0)}}, r"\[nan, 2\] are no two rising numbers: give \[low, high\]"),
         ({"horizon": 1.5}, "must hold two steps"),
         ({"weights": {"u": 0.0}}, "must be above 0"),
         ({"weights": {"u": 0.1, "propeller.thrust": 1e4}, "commands": "between"}, "'between' is not for measured out"),
@@ -495,7 +494,7 @@ def test_intervals_of_discounted_fits_cover(noise: str) -> None:
             data = changed(clean, **{n: clean.frame[n] + rng.normal(0, w, len(clean.frame)) for n, w in widths.items()})
         base = SHIP.with_values({path: SHIP.parameters[path] / rng.normal(1, 0.1) for path in FEW})
         solution = identify(base, data, data.runs, settings(prior={"hull.*": 0.1}, discount=True))
-        known, true = fit_statistics(LinearFit.of(solution)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
+        known, true = fit_statistics(solution), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
         low, high = known.low[: len(FEW)], known.high[: len(FEW)]  # a current may follow
         held += ((low <= true) & (true <= high)).tolist()
     assert np.mean(held) > 0.90 - 2 * (0.9 * 0.1 / len(held)) ** 0.5

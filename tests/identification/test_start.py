@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
+from shipid.data.dataset import Dataset
+from shipid.errors import DataError
 from shipid.identification.fit import evaluate_factors, initial_point
-from shipid.identification.residuals import build_problem
+from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.settings import Identify
-from shipid.identification.start import by_inverse_dynamics, grow_horizon
-from shipid.vessel.load import load_vessel
+from shipid.identification.solve import by_inverse_dynamics, grow_horizon
+from shipid.simulation.truth import Truth, simulate_truth
+from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import trials
 
 SHIP = load_vessel("gunnerus-28.9")
 DATA = trials(SHIP, runs=4)
+MAIN = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "X_rv", "Y_ur", "Y_rrr", "N_ur", "N_rrr", "N_r|r|"))
+PORT, STARBOARD = "thruster.port.D_p", "thruster.starboard.D_p"
 SETTINGS = Identify(parameters=["hull.derivatives.*"], horizon=0, weights={"u": 1e-2, "v": 1e-2, "r": 1e-3})
 
 
@@ -55,3 +62,65 @@ def test_inverse_dynamics_keeps_within_the_bounds() -> None:
     factors = by_inverse_dynamics(problem, DATA)
     place = problem.unknown.paths.index("hull.derivatives.N_ur")
     assert factors[place] == 1.5
+
+
+@cache
+def turning_log(noise: float = 0.0) -> Dataset:
+    """Eight manoeuvres of a minute, rows at 5 Hz with noise of u and v [m/s], and of r a tenth of it [rad/s]."""
+    orders = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}
+    wanted = Truth(vessel=SHIP.key, manoeuvres=8, duration=60, step=0.05, interval=0.2, manoeuvre=[orders])
+    frame, rng = simulate_truth(wanted, SHIP), np.random.default_rng(0)
+    sizes = {"u": noise, "v": noise, "r": 0.1 * noise, "psi": 0.1 * noise, "north": 15 * noise, "east": 15 * noise}
+    noisy = {name: frame[name] + rng.normal(0, size, len(frame)) for name, size in sizes.items()}
+    return Dataset(frame.assign(**noisy), {})
+
+
+def first_guess(base: Vessel, log: Dataset, **more: object) -> tuple[Problem, np.ndarray]:
+    """The problem, and its start by inverse dynamics."""
+    problem = build_problem(base, log, log.runs, Identify(**{"parameters": MAIN, "step": 0.2, "horizon": 10.0, **more}))
+    return problem, by_inverse_dynamics(problem, log)
+
+
+def objective(problem: Problem, factors: np.ndarray) -> float:
+    return evaluate_factors(problem, factors, initial_point(problem)).objective
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_forces_lead_near_the_truth_also_of_numbers_in_which_they_are_not_linear(seed: int) -> None:
+    """Both propellers share one factor of their diameter; thrust goes with its fourth power and more."""
+    draw, paths = np.random.default_rng(seed), (*MAIN, PORT, STARBOARD)
+    factors = np.append(draw.uniform(0.7, 1.3, len(MAIN)), 2 * [draw.uniform(0.8, 1.2)])
+    base = SHIP.with_values({path: SHIP.parameters[path] / x for path, x in zip(paths, factors, strict=True)})
+    problem, start = first_guess(base, turning_log(), parameters=paths, together=[[PORT, STARBOARD]])
+    assert start[-1] == pytest.approx(factors[-1], rel=0.02)
+    assert objective(problem, start) < 0.01 * objective(problem, np.ones(len(start)))
+
+
+def test_forces_give_a_derivative_that_the_base_lacks() -> None:
+    base = SHIP.with_values({MAIN[4]: 0.0})
+    _, start = first_guess(base, turning_log(), parameters=MAIN[4:5], scale={MAIN[4]: 1e6})
+    assert start[0] * 1e6 == pytest.approx(SHIP.parameters[MAIN[4]], rel=0.1)
+
+
+def test_what_forces_do_not_show_stays_at_the_base_and_priors_hold() -> None:
+    unseen = "thruster.port.k_over2"
+    _, free = first_guess(SHIP, turning_log(), parameters=[MAIN[4], unseen])
+    assert free[1] == pytest.approx(1)
+    base = SHIP.with_values({MAIN[4]: -2e6})
+    _, tight = first_guess(base, turning_log(), parameters=[MAIN[4]], prior={MAIN[4]: 1e-9})
+    np.testing.assert_allclose(tight, 1, atol=1e-6)
+
+
+def test_noise_is_averaged_and_a_start_can_be_simulated() -> None:
+    """0.1 m/s at 5 Hz would be an acceleration noise of 0.7 m/s^2; Y_v|r| and Y_r|v| do the same."""
+    log, pair = turning_log(0.1), ["hull.derivatives.Y_v|r|", "hull.derivatives.Y_r|v|"]
+    assert np.abs(first_guess(SHIP, log, parameters=pair)[1] - 1).max() < 0.5
+    _, start = first_guess(SHIP.with_values({MAIN[4]: 0.7 * SHIP.parameters[MAIN[4]]}), log, parameters=[MAIN[4]])
+    assert start[0] == pytest.approx(1 / 0.7, rel=0.2)
+
+
+def test_runs_too_short_for_a_bump_are_reported() -> None:
+    short = Dataset(turning_log().frame.groupby("run").head(8).reset_index(drop=True), {})
+    problem = build_problem(SHIP, short, short.runs, Identify(parameters=MAIN, step=0.2, horizon=1.0))
+    with pytest.raises(DataError, match="no stretch is longer"):
+        by_inverse_dynamics(problem, short)

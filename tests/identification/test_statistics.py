@@ -11,8 +11,8 @@ from scipy import stats
 
 from shipid.errors import ShipidError
 from shipid.identification.statistics import (
+    Basis,
     LinearFit,
-    _Basis,
     _Drift,
     _signal_drift,
     against_priors,
@@ -23,7 +23,7 @@ from shipid.identification.statistics import (
     pooled_autocorrelation,
     residual_whiteness,
 )
-from tests.identification.linear import SIGNALS, design, fitted, labels, noise
+from tests.identification.linear import SIGNALS, design, fitted, labels, linear_fit, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
 JACOBIAN = design(RUNS, SAMPLES, COUNT)
@@ -67,7 +67,7 @@ def test_residuals_of_a_signal_that_says_nothing_of_a_factor_do_not_count() -> N
     )
     jacobian = np.where(of_r[:, None], 0.0, JACOBIAN)
     fit = fitted(jacobian, error, CLUSTERS, NAMES)
-    assert not residual_whiteness(fit)["r"].white
+    assert not residual_whiteness(fit, Basis.of_none(fit))["r"].white
     assert fit_statistics(fit).chosen == "fisher"
     assert fit_statistics(fitted(JACOBIAN, error, CLUSTERS, NAMES)).chosen == "sandwich"
 
@@ -148,8 +148,8 @@ def test_a_run_that_alone_decides_a_factor_is_named() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[CLUSTERS != 4, 2] *= 0.01
     fit = fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.8), CLUSTERS, NAMES, runs=names)
-    assert factors_of_single_runs(fit) == {fit.paths[2]: "M05"}
-    assert factors_of_single_runs(one(0.8, runs=names)) == {}
+    assert factors_of_single_runs(fit_statistics(fit)) == {fit.paths[2]: "M05"}
+    assert factors_of_single_runs(fit_statistics(one(0.8, runs=names))) == {}
 
 
 def test_freedom_of_a_mean_over_equal_clusters() -> None:
@@ -171,7 +171,7 @@ def test_order_of_runs_and_parameters_is_of_no_account() -> None:
     estimates = fit_statistics(fit)
     rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
     columns = rng.permutation(COUNT)
-    moved = LinearFit(
+    moved = linear_fit(
         tuple(fit.paths[j] for j in columns),
         fit.factors[columns],
         fit.residuals[rows],
@@ -212,10 +212,10 @@ def test_whiteness_is_that_of_ljung_and_box_and_of_means_over_quarters() -> None
         expected += n * (n + 2) * float((r**2 / (n - np.arange(1, lags + 1))).sum())
         freedom += lags
     clusters = np.repeat([0, 1], runs)
-    fit = LinearFit(("p",), np.ones(1), np.concatenate(errors), np.ones((97, 1)), clusters, ("u",) * 97)
+    fit = linear_fit(("p",), np.ones(1), np.concatenate(errors), np.ones((97, 1)), clusters, ("u",) * 97)
     drifts = sum(float(part.sum() ** 2 / len(part) / np.mean(e**2)) for e in errors for part in np.array_split(e, 4))
     both = stats.chi2.sf(expected, freedom), stats.chi2.sf(drifts, 8)
-    assert residual_whiteness(fit)["u"].probability == pytest.approx(min(2 * min(both), 1.0))
+    assert residual_whiteness(fit, Basis.of_none(fit))["u"].probability == pytest.approx(min(2 * min(both), 1.0))
 
 
 T = np.arange(200)
@@ -235,7 +235,14 @@ def begun(error: np.ndarray, jacobian: np.ndarray = SLOW, runs: int = 1) -> Line
 
 
 def drifts(fit: LinearFit) -> _Drift:
-    return _signal_drift(fit, [np.flatnonzero(fit.clusters == run) for run in np.unique(fit.clusters)], _Basis.of(fit))
+    return _signal_drift(fit, [np.flatnonzero(fit.clusters == run) for run in np.unique(fit.clusters)], Basis.of(fit))
+
+
+def drift_levels(fit: LinearFit) -> np.ndarray:
+    """Variance of the residuals of each run, with what the factors have taken."""
+    left = 1 - Basis.of(fit).leverage
+    return np.array([np.square(fit.residuals[fit.clusters == run]).sum() / left[fit.clusters == run].sum()
+                     for run in np.unique(fit.clusters)])  # fmt: skip
 
 
 @pytest.mark.parametrize("prior", [np.inf, 0.2])
@@ -246,9 +253,13 @@ def test_the_covariance_of_means_over_quarters_is_that_of_residuals_of_a_fit(pri
     Q = np.kron(np.eye(2), QUARTER) / 50**0.5
     inverse = np.linalg.inv(fit.jacobian.T @ fit.jacobian + np.eye(SLOW.shape[1]) / prior**2)
     C = Q @ (np.eye(400) - fit.jacobian @ inverse @ fit.jacobian.T) @ Q.T
-    seen = drifts(fit)
-    assert (seen.expected, seen.squares) == pytest.approx((np.trace(C), np.trace(C @ C)))
-    assert seen.expected < 7
+    z, expected, squares = Q @ fit.residuals, np.trace(C), np.trace(C @ C)
+    freedom, level = expected**2 / squares, np.repeat(drift_levels(fit), 4)
+    seen, total = drifts(fit), float((z**2 / level).sum())
+    assert seen.ratio == pytest.approx(1 + (total - expected) / squares)
+    assert seen.probability == pytest.approx(stats.chi2.sf(total * expected / squares, freedom))
+    assert seen.hidden == pytest.approx((stats.chi2.isf(0.025, freedom) / freedom - 1) * expected / squares)
+    assert expected < 7
 
 
 def test_ten_runs_show_a_drift_that_would_matter() -> None:
@@ -331,9 +342,8 @@ def test_what_ends_at_a_bound_has_no_interval_and_harms_no_other() -> None:
     estimates = fit_statistics(one(at_bound=bound))
     assert np.isinf(estimates.high[1])
     assert "bound" in estimates.sentences[1]
-    without = replace(
-        one(), **{"paths": tuple("abcde"), "factors": np.ones(5), "jacobian": np.delete(one().jacobian, 1, axis=1)}
-    )
+    fewer = np.delete(one().jacobian, 1, axis=1)
+    without = linear_fit("abcde", np.ones(5), one().residuals, fewer, CLUSTERS, NAMES)
     np.testing.assert_allclose(estimates.errors[~bound], fit_statistics(without).errors, rtol=1e-9)
 
 
@@ -345,7 +355,7 @@ def test_what_is_held_counts_as_known() -> None:
     assert not estimates.identifiable[held].any()
     assert "p1 was held at " in estimates.sentences[1]
     assert "p3 was dropped" in estimates.sentences[3]
-    without = replace(one(), **{"paths": tuple("abcd"), "factors": np.ones(4), "jacobian": one().jacobian[:, ~held]})
+    without = linear_fit("abcd", np.ones(4), one().residuals, one().jacobian[:, ~held], CLUSTERS, NAMES)
     np.testing.assert_allclose(estimates.errors[~held], fit_statistics(without).errors, rtol=1e-9)
 
 
@@ -361,7 +371,7 @@ def test_nuisances_cost_degrees_of_freedom() -> None:
     jacobian = centred(design(RUNS, 8, 3))
     fit = fitted(jacobian, centred(error[:, None])[:, 0], *labels(RUNS, 8), spent=np.full(len(error), 1 / 8))
     levels = {name: colour.level for name, colour in fit_statistics(fit).whiteness.items()}
-    plain = {name: colour.level for name, colour in fit_statistics(replace(fit, spent=None)).whiteness.items()}
+    plain = {name: colour.level for name, colour in fit_statistics(replace(fit, spent=0 * fit.spent)).whiteness.items()}
     assert levels["u"] == pytest.approx(1.3, abs=0.15)
     assert levels["u"] / plain["u"] == pytest.approx(np.sqrt(8 / 7), rel=0.01)
 
@@ -378,9 +388,9 @@ def test_blocks_cut_all_signals_at_the_same_times() -> None:
 def test_fits_without_a_meaning_are_refused() -> None:
     fit = one()
     with pytest.raises(ShipidError, match="use more data"):
-        replace(fit, residuals=fit.residuals[:5], jacobian=fit.jacobian[:5], clusters=CLUSTERS[:5], signals=NAMES[:5])
+        fit_statistics(linear_fit(fit.paths, fit.factors, fit.residuals[:5], fit.jacobian[:5], CLUSTERS[:5], NAMES[:5]))
     with pytest.raises(ShipidError, match="finite"):
-        replace(fit, residuals=fit.residuals * np.nan)
+        fit_statistics(replace(fit, residuals=fit.residuals * np.nan))
 
 
 @pytest.mark.parametrize(("width", "true", "contrary"), [(0.01, 1.6, True), (0.1, 1.6, True), (1.0, 1.6, False)])
@@ -392,13 +402,19 @@ def test_a_prior_that_the_data_contradict_is_told(width: float, true: float, con
     prior = np.array([width, np.inf])
     precision = np.diag(1 / prior**2)
     factors = np.linalg.solve(J.T @ J + precision, J.T @ measured + precision @ np.ones(2))
-    fit = LinearFit(
-        ("hull.p1", "hull.p2"), factors, J @ factors - measured, J, np.repeat(np.arange(8), 50), ("u",) * 400, prior
+    fit = linear_fit(
+        ("hull.p1", "hull.p2"),
+        factors,
+        J @ factors - measured,
+        J,
+        np.repeat(np.arange(8), 50),
+        ("u",) * 400,
+        prior_widths=prior,
     )
     alone = np.linalg.lstsq(J, measured, rcond=None)[0]
     error = np.sqrt(np.linalg.inv(J.T @ J)[0, 0])
     assert (abs(alone[0] - 1) > 3 * np.hypot(width, error)) == contrary
-    told = against_priors(fit)
+    told = against_priors(fit_statistics(fit))
     assert list(told) == (["hull.p1"] if contrary else [])
     if contrary:
         assert told["hull.p1"][:2] == pytest.approx((width, alone[0]))

@@ -13,9 +13,9 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
+from shipid.identification.fit import Solution
 from shipid.identification.outcome import COMPARED
 from shipid.identification.settings import Identify
-from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.structures import exchange_structure
 from shipid.report.structures import write_structures
@@ -28,7 +28,6 @@ from shipid.study.structures import (
     _structure_table,
     _with_mean,
     compare_structures,
-    structures_content,
     uninformative_structures,
     with_actuators_on,
     write_chosen_structure,
@@ -110,7 +109,7 @@ def test_the_structure_that_made_the_data_is_chosen(comparison: StructureCompari
 def test_the_vessel_chosen_and_the_page_are_written(comparison: StructureComparison, tmp_path: Path) -> None:
     again = load_vessel(str(write_chosen_structure(comparison, tmp_path / "chosen.toml")))
     assert again.parameters == pytest.approx(comparison.fits[comparison.chosen].vessel.parameters)
-    page = write_structures(structures_content(comparison, "log.parquet", "shipid identify"), tmp_path / "page.html")
+    page = write_structures(comparison.page("log.parquet", "shipid identify"), tmp_path / "page.html")
     text = page.read_text()
     for word in ("modulus", "abkowitz", "tactical diameter", "Which structure"):
         assert word in text
