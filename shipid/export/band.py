@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.export.correctors import distance_to_nearest, stacked_inputs
-from shipid.export.known import NamedExpressions, PredictorInputs, all_within, column_of_entries
-from shipid.hybrid.bands import FEWEST, LEVELS, Bands, FastMotion, fast_filters
+from shipid.export.correctors import distance_to_nearest
+from shipid.export.known import NamedExpressions, column_of_entries
+from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.novelty import NoveltyAlarm, range_of_orders, range_rounding
 
 BAND_CHOICE = ("level", "pointwise", "kind")
 """Inputs of a band: its level, whether each step is taken alone (0 or 1), the kind of manoeuvre (0: any)."""
@@ -36,37 +36,15 @@ def half_axes_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
 
 
 def band_rows(
-    bands: Bands, now: NamedExpressions, path: MX, step: float, half: MX, past: Sequence[NamedExpressions] = ()
+    bands: Bands, now: NamedExpressions, path: MX, step: float, half: MX, past: Mapping[str, Any] | None = None
 ) -> MX:
     """Rows (4, T) of `BAND_ROWS` around a path (2, T) of steps [s]; half axes (T, 2), rows of the past."""
     point = column_of_entries(now, bands.names) / ca.DM(bands.spread)
     grown = _band_growth(bands, path, now["r"], step, distance_to_nearest(point, bands.centres / bands.spread))
     if bands.fast is not None:
-        grown *= _fast_growth(bands.fast, [*past[-bands.fast.past :], now])
+        columns: Mapping[str, Any] = {name: ca.ArrayInterface.MX(now[name], shape=(1,)) for name in MOTIONS}
+        grown *= MX(bands.fast.growth(columns, past or {}))
     return ca.vertcat(grown * half.T, _track_directions(path))
-
-
-def _fast_growth(fast: FastMotion, rows: Sequence[NamedExpressions]) -> MX:
-    """How much wider the band is in fast motion, as `FastMotion.growth`."""
-    series = [ca.vertcat(*(row[name] for row in rows)) for name in MOTIONS]
-    filters = [ca.DM(one) for one in fast_filters(len(rows))]
-    powers = ca.vertcat(*(ca.sumsqr(ca.mtimes(one, values)) / len(rows) for values in series for one in filters))
-    return MX(ca.sqrt(ca.fmax(ca.mmax(powers * ca.DM(fast.weights)), 1)))
-
-
-def is_alarm_raised(alarm: NoveltyAlarm, known: PredictorInputs) -> MX:
-    """Whether the alarm is raised, as `NoveltyAlarm.is_raised`."""
-    table, measured = known.table(alarm.inputs), MX(1)
-    for name in alarm.inputs.commands:
-        series = ca.vertcat(*(row[name] for row in known.past[len(known.past) - alarm.past :]), known.now[name])
-        table[range_of_orders(name)] = ca.mmax(series) - ca.mmin(series)  # these pass over NaN
-        measured = ca.logic_and(measured, all_within(series))
-    away = ca.mtimes(ca.DM(alarm.root.T), stacked_inputs(table, alarm.names) - ca.DM(alarm.middle))
-    rounding, values = ca.DM(range_rounding(alarm.low, alarm.high)), stacked_inputs(table, alarm.limited)
-    slack = alarm.slack * ca.fmax(ca.DM(alarm.high - alarm.low), rounding) + rounding
-    reach = ca.vertcat(ca.DM(alarm.low) - values, values - ca.DM(alarm.high)) - ca.vertcat(slack, slack)
-    inside = ca.logic_and(ca.norm_2(away) <= alarm.farthest, ca.sum1(reach <= 0) > reach.numel() - 0.5)
-    return ca.logic_not(ca.logic_and(inside, measured))
 
 
 def _track_directions(path: MX) -> MX:

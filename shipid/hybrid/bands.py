@@ -70,7 +70,8 @@ class FastMotion(StoredData):
     def growth(self, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Array:
         """How much wider (S,) a band is, 1 or more."""
         power = fast_power(columns, past, self.past) * self.weights
-        return np.asarray(np.sqrt(np.maximum(power.max(axis=1), 1.0)))
+        size: Array = np.sqrt(np.maximum(power.max(axis=1), 1.0))
+        return size
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,9 +218,9 @@ def fast_filters(rows: int) -> Array:
 
 def fast_power(columns: Mapping[str, Array], past: Mapping[str, Array], rows: int) -> Array:
     """Mean squares (S, 6) of u, v, r over the last rows and the instant, each through both `fast_filters`."""
-    series = np.stack([np.concatenate([past[name][-rows:], columns[name][None]]) for name in MOTIONS])  # (3, N, S)
-    passed = np.einsum("fij,mjs->mfis", fast_filters(rows + 1), series, optimize=True)
-    return np.asarray(np.square(passed).mean(axis=2).reshape(6, -1).T)
+    series = [np.concatenate([past[name][-rows:], np.stack([columns[name]])]) for name in MOTIONS]  # (N, S) each
+    filters = fast_filters(rows + 1)
+    return np.stack([np.square(one @ values).mean(axis=0) for values in series for one in filters], axis=1)
 
 
 def path_chords(paths: Array) -> Array:

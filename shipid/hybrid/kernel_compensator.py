@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.hybrid.compensator import Normaliser, PathCorrector, unflatten_paths
+from shipid.hybrid.compensator import Normaliser, PathCorrector, weigh_shapes
 from shipid.hybrid.features import input_group
 from shipid.hybrid.method import Array
 from shipid.hybrid.stored import StoredData
@@ -34,13 +34,11 @@ def kernel_group(name: str) -> str:
 def kernel_values(points: Any, centres: Any, linear: Any, maths: Any = np) -> Any:
     """exp(-|z - c|^2 / 2) + l (1 + z c) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales."""
     product = points @ centres.T
-    values = product - (points**2).sum(-1)[..., None] / 2
+    values = product - (points**2).sum(-1).reshape(*points.shape[:-1], 1) / 2
     values -= (centres**2).sum(-1) / 2
-    maths.exp(values, out=values)
     product += 1
     product *= linear
-    values += product
-    return values
+    return maths.exp(values) + product
 
 
 @dataclass(frozen=True)
@@ -69,11 +67,11 @@ class KernelCompensator(PathCorrector):
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
         z, terms = self.normaliser.apply(table), self.basis.shape[1]
-        total: Array = np.zeros((len(z), 2 * terms))
+        total: Any = 0.0
         for one in self.members:
             centres = self.centres / one.scales
-            total += kernel_values(z / one.scales, centres, one.linear) @ one.weights
+            total = total + kernel_values(z / one.scales, centres, one.linear) @ one.weights
             if self.reflection is not None:
                 image = kernel_values(z @ self.reflection / one.scales, centres, one.linear) @ one.weights
-                total += np.repeat([1.0, -1.0], terms) * image
-        return np.asarray(np.tensordot(self.basis, unflatten_paths(total / len(self.members)), 1))
+                total = total + np.repeat([1.0, -1.0], terms) * image
+        return weigh_shapes(self.basis, total / len(self.members))
