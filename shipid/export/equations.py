@@ -14,7 +14,7 @@ from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate_step
 from shipid.physics.grammar import AXES
 from shipid.physics.signals import ACTUAL, SIGNALS, signal_of, signal_row
-from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
+from shipid.simulation.log import horizontal_velocities, state_column
 from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -103,13 +103,6 @@ class Equations:
         """Memories that have reached their orders, as far as their stops let them."""
         places = [self.model.commands.index(name) for name in self.model.memory]
         return MX(self.advance(commands[places], commands, parameters, 0)) if places else MX(0, 1)
-
-    def aboard(self, state: MX) -> MX:
-        """State with velocities along the ship's axes from one with horizontal u, v, r, as a log has them."""
-        if set(self.model.state).isdisjoint(LEANING):
-            return state
-        now = split_by_name(self.states, state)
-        return MX(ca.vertcat(*(now | body_velocities(now, ca)).values()))
 
     def horizontal(self, carries: MX) -> MX:
         """u, v, r in the horizontal plane of one carry, or of a column for each step."""

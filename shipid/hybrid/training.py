@@ -24,8 +24,8 @@ from shipid.hybrid.method import Array, Index
 Stack = Sequence[tuple[Tensor, Tensor]]
 Shapes = Mapping[str, tuple[int, ...]]
 Part = tuple[Sequence[tuple[list[Array], Array]], Array]
-"""What is read, P + 1 rows (S, d) of the past with inputs at the instant (S, e), then its mirror image if there is one; and
-outputs (S, 2 r)."""
+"""What is read, P + 1 rows (S, d) of the past with inputs at the instant (S, e), then its mirror image if there is one;
+and outputs (S, 2 r)."""
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's defaults
 
