@@ -31,6 +31,11 @@ class Alone(Method):
     meets_none: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = UnchangedPath
 
+    @property
+    def together(self) -> bool:
+        """There is nothing to compute: a unit of work for each foundation would cost more than the fit."""
+        return True
+
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Return the unchanged physics for every foundation; its errors on the windows are fair: it learned nothing."""
         return {name: FitResult(UnchangedPath({}), [], 0.0, left_out) for name, left_out in task.targets.items()}

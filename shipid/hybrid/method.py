@@ -188,6 +188,11 @@ class Method(CheckedModel, BaseModel, ABC):
         return self.traits.memory.past
 
     @property
+    def together(self) -> bool:
+        """Whether several foundations, which cost much less in one fit, are one unit of work."""
+        return False
+
+    @property
     def traits(self) -> Traits:
         """What a study says of this method and compares it by."""
         return Traits()

@@ -78,6 +78,11 @@ class PathDrawn(SearchMethod):
     observer_scale: Scale = (2.0, 32.0)
     choose: bool = False
 
+    @property
+    def together(self) -> bool:
+        """One decomposition a trial serves all foundations."""
+        return True
+
     def inputs(self, commands: tuple[str, ...]) -> Inputs:
         """Return which quantities the networks may take, given the names of the command columns."""
         return Inputs(commands, self.memory)

@@ -58,6 +58,11 @@ class PathTrained(SearchMethod):
     memory: Memory = Memory()
     at_once: PositiveInt = 1
 
+    @property
+    def together(self) -> bool:
+        """Networks of one architecture train as one stack; where it is searched, hardly any two are alike."""
+        return not any(isinstance(getattr(self, name), tuple) for name in self.COUNTS)
+
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
