@@ -65,7 +65,7 @@ class NetworkTraining:
             for sides, outputs in parts
         ]
         learned = [one for one in self.network.parameters() if one.requires_grad]
-        self.optimiser = torch.optim.AdamW(learned, rate(0), (0.9, 0.999), weight_decay=decay)
+        self.optimiser = torch.optim.AdamW(learned, rate(0), weight_decay=decay, fused=True)
         self.best, self.kept = np.inf, {name: np.full_like(one, np.nan, float) for name, one in self._layers().items()}
 
     @property
@@ -88,8 +88,10 @@ class NetworkTraining:
         for group in self.optimiser.param_groups:
             group["lr"] = self.rate(self.epochs)
         batch = self.length.batch or count
-        for rows in torch.split(torch.randperm(count), batch) if batch < count else [torch.arange(count)]:
-            self.network.train(len(rows) > 1)  # one window alone has no spread that BatchNorm could learn
+        for rows in torch.split(torch.randperm(count), batch) if batch < count else [slice(None)]:
+            self.network.train(
+                isinstance(rows, slice) or len(rows) > 1
+            )  # one window alone has no spread that BatchNorm could learn
             loss = self._loss(0, rows)
             self.optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
@@ -97,7 +99,7 @@ class NetworkTraining:
             total += loss.item()
         self.network.eval()
         with torch.no_grad():
-            judged = float(self._loss(1, torch.arange(len(self.seen[1][1]))))
+            judged = self._loss(1, slice(None)).item()
         self.epochs += 1
         better = judged < self.best
         self.waited = 0 if better else self.waited + 1
@@ -107,11 +109,12 @@ class NetworkTraining:
             self.best, self.kept = judged, self._layers()
         self.running &= self.waited < (self.length.patience or np.inf)
 
-    def _loss(self, part: int, rows: Tensor) -> Tensor:
+    def _loss(self, part: int, rows: Tensor | slice) -> Tensor:
         """Mean squared error of rows of a part (S, 2 r); with an image, x is made even and y odd."""
         sides, outputs = self.seen[part]
+        chosen = [[one[..., rows, :] for one in side] for side in sides]
         made = self.network(
-            *(torch.cat([one[..., rows, :] for one in same], dim=-2) for same in zip(*sides, strict=True))
+            *(torch.cat(same, dim=-2) if len(same) > 1 else same[0] for same in zip(*chosen, strict=True))
         )
         if len(sides) == 2:
             sign = torch.tensor([1.0, -1.0], device=made.device).repeat_interleave(made.shape[1] // 2)
@@ -133,8 +136,9 @@ def tanh_network(widths: Sequence[int], input_dropout: float, hidden_dropout: fl
     """Layers of tanh and a linear one, with drop-out before each."""
     parts: list[torch.nn.Module] = []
     for inputs, outputs in pairwise(widths):
-        parts += [torch.nn.Dropout(hidden_dropout if parts else input_dropout), torch.nn.Linear(inputs, outputs)]
-        parts.append(torch.nn.Tanh())
+        dropped = hidden_dropout if parts else input_dropout
+        parts += [torch.nn.Dropout(dropped)] if dropped else []
+        parts += [torch.nn.Linear(inputs, outputs), torch.nn.Tanh()]
     return torch.nn.Sequential(*parts[:-1])
 
 
