@@ -73,28 +73,14 @@ class Equations:
             "parameters": {name: self.vessel.units[name] for name in model.parameters},
         }
 
-    @property
-    def rates(self) -> ca.Function:
-        """(state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt."""
-        return calm_rates(self.model)
-
-    @property
-    def advance(self) -> ca.Function:
-        """(memory, commands, parameters, dt) -> memory after dt; neither state nor weather moves an actuator."""
-        return memory_advance(self.model)
-
-    def step(self, method: Method, step: float | None = None) -> ca.Function:
-        """(carry, commands, environment, loads, parameters) -> carry after `step` [s], or after a sixth input `dt`."""
-        return step_function(self.model, method, step)
-
     def functions(self, method: Method) -> dict[str, ca.Function]:
         """`step`, and of its inputs but `dt`: `rates`, and `begin`, the carry with actuators at their orders."""
         inputs, count = symbols_of({group: len(units) for group, units in self.groups.items()}), len(self.states)
         carry, commands, environment, loads, parameters = inputs.values()
-        rates = self.rates(carry[:count], carry[count:], commands, environment, parameters, loads)
+        rates = calm_rates(self.model)(carry[:count], carry[count:], commands, environment, parameters, loads)
         begun = ca.vertcat(carry[:count], self.begun(commands, parameters))
         return {
-            "step": self.step(method),
+            "step": step_function(self.model, method),
             "rates": function_by_names("rates", inputs, {"rates": rates}),
             "begin": function_by_names("begin", inputs, {"begun": begun}),
         }
@@ -102,7 +88,7 @@ class Equations:
     def begun(self, commands: MX, parameters: MX) -> MX:
         """Memories that have reached their orders, as far as their stops let them."""
         places = [self.model.commands.index(name) for name in self.model.memory]
-        return MX(self.advance(commands[places], commands, parameters, 0)) if places else MX(0, 1)
+        return MX(memory_advance(self.model)(commands[places], commands, parameters, 0)) if places else MX(0, 1)
 
     def horizontal(self, carries: MX) -> MX:
         """u, v, r in the horizontal plane of one carry, or of a column for each step."""
@@ -118,7 +104,7 @@ def _input_symbols(model: Dynamics) -> list[SX]:
 
 @lru_cache(maxsize=32)
 def calm_rates(model: Dynamics) -> ca.Function:
-    """`Equations.rates` of all vessels of one structure."""
+    """(state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt, of all vessels of one structure."""
     inputs, tau = _input_symbols(model), SX.sym("tau_extra", model.num_dof)
     calm = replace(model, sums=tuple(term for term in model.sums if term.arrays is not None))
     given = dict(zip((*INPUTS, "tau_extra"), (*inputs, tau), strict=True))
@@ -127,7 +113,7 @@ def calm_rates(model: Dynamics) -> ca.Function:
 
 @lru_cache(maxsize=32)
 def memory_advance(model: Dynamics) -> ca.Function:
-    """`Equations.advance` of all vessels of one structure."""
+    """(memory, commands, parameters, dt) -> memory after dt; neither state nor weather moves an actuator."""
     state, memory, commands, environment, parameters = _input_symbols(model)
     dt = SX.sym("dt")
     after = model.advance(0 * state, memory, commands, 0 * environment, parameters, dt)
@@ -136,8 +122,8 @@ def memory_advance(model: Dynamics) -> ca.Function:
 
 
 @lru_cache(maxsize=32)
-def step_function(model: Dynamics, method: Method, step: float | None) -> ca.Function:
-    """`Equations.step` of all vessels of one structure."""
+def step_function(model: Dynamics, method: Method, step: float | None = None) -> ca.Function:
+    """(carry, commands, environment, loads, parameters) -> carry after `step` [s], or after a sixth input `dt`."""
     states = len(model.state) + len(model.hidden)
     sizes = {"carry": states + len(model.memory), "commands": len(model.commands)}
     sizes |= {"environment": len(model.environment), "loads": model.num_dof, "parameters": len(model.parameters)}

@@ -18,7 +18,7 @@ from casadi import MX
 from shipid.data.windows import Instants
 from shipid.engine.engines import AUTO
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.equations import Equations, rollout_records, split_by_name, symbols_of
+from shipid.export.equations import Equations, rollout_records, split_by_name, step_function, symbols_of
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.physics import Physics, positions_in_frame
 from shipid.vessel.dynamics import vessel_dynamics
@@ -95,7 +95,10 @@ class SymbolicPhysics(Physics):
         reached = split_by_name(model.commands, orders[:, 0]) if instants.hidden is None else instants.hidden
         carry = ca.vertcat(column_of_entries(start, equations.states), rows(tuple(model.memory), reached))
         tau = MX(np.zeros(model.num_dof)) if slow is None else MX(slow.reshape(self.horizon, model.num_dof)).T
-        step, inputs = equations.step(self.integrator, self.step), [orders, rows(model.environment, environment), tau]
+        step, inputs = (
+            step_function(model, self.integrator, self.step),
+            [orders, rows(model.environment, environment), tau],
+        )
         return ca.horzcat(carry, rollout_records(step, carry, inputs, equations.values, self.horizon))
 
     def is_slow(self, records: MX) -> MX:

@@ -24,14 +24,13 @@ from shipid.hybrid.method import FitResult, Index, Row, Task, shared_tables
 from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import (
     Search,
-    SearchMethod,
     best_trials,
     seed_of,
     suggested_points,
     trial_row,
     windows_of_folds,
 )
-from shipid.hybrid.training import Length, NetworkTraining, tanh_network, train_units
+from shipid.hybrid.training import NetworkTraining, tanh_network, train_units
 from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
@@ -40,17 +39,15 @@ PARTS = 3  # of the folds: with one for each fold Adam soon finds what only they
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
 
-def tune_gradient(
-    task: Task, method: SearchMethod, inputs: Inputs, length: Length, at_once: int = 1
-) -> dict[str, FitResult]:
+def tune_gradient(task: Task, method: Any) -> dict[str, FitResult]:
     """Train networks for each foundation.
 
     The objective is the mean validation error over the folds; the compensator is the mean of the fold networks of the
     best trial. The sampler of a trial is seeded by its number.
 
-    at_once : trials that are proposed at a time; more than one race.
+    method : a `PathTrained`.
     """
-    trainer, search = _Trainer(task, inputs, length), Search(task, task.cases, method)
+    trainer, search, at_once = _Trainer(task, method), Search(task, task.cases, method), method.at_once
     if search.done != search.count:  # a round that was interrupted begins again
         search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
     best: dict[str, _TrialOutcome] = {}  # of the trials that were trained here
@@ -79,9 +76,9 @@ _TrialOutcome = tuple[Row, tuple[Network, ...]]  # the row of a trial, and the n
 class _Trainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(self, task: Task, inputs: Inputs, length: Length) -> None:
-        self.task, self.inputs, self.length = task, inputs, length
-        self.tables = shared_tables(task, inputs)
+    def __init__(self, task: Task, method: Any) -> None:
+        self.task, self.method, self.inputs = task, method, Inputs(task.commands, method.memory)
+        self.tables = shared_tables(task, self.inputs)
         self.targets = {key: flatten_paths(paths) for key, paths in task.targets.items()}
 
     def _begin(self, trial: Trial, fold: int, settings: Mapping[str, float]) -> _FoldTraining:
@@ -94,7 +91,7 @@ class _Trainer:
         begun = NetworkTraining(
             lambda: tanh_network(widths, settings["input_dropout"], settings["hidden_dropout"]),
             [([(values[rows],)], targets[rows]) for rows in (training, validation)],
-            self.length,
+            self.method,
             lambda _: settings["learning_rate"],
             settings["weight_decay"],
             seed_of(self.task.seed, number, fold, key),
@@ -108,14 +105,14 @@ class _Trainer:
         running = {trial: [self._begin(trial, fold, point) for fold in folds] for trial, point in asked.items()}
         seconds, stopped = dict.fromkeys(asked, 0.0), set[Trial]()
         per_model = len(asked) // len(self.tables)
-        ends = [self.length.epochs >> halving for halving in range(HALVINGS if per_model > 1 else 0, -1, -1)]
+        ends = [self.method.epochs >> halving for halving in range(HALVINGS if per_model > 1 else 0, -1, -1)]
         for place, (before, epoch) in enumerate(pairwise([0, *filter(None, ends)]), start=1):
             for trial, members in running.items():
                 start = time.process_time()
                 for one in members:
                     one.training.advance(epoch - before)
                 seconds[trial] += time.process_time() - start
-            if epoch < self.length.epochs:
+            if epoch < self.method.epochs:
                 stopped |= _stop_worst(running, ceil(per_model / 2**place))
         outcomes = {}
         for trial, members in running.items():

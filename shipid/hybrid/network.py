@@ -30,7 +30,7 @@ from shipid.hybrid.recurrent import (
     Sequences,
 )
 from shipid.hybrid.search import Point, SearchProblem
-from shipid.hybrid.training import Length, train_reader
+from shipid.hybrid.training import train_reader
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,7 @@ class NetworkProblem(RecurrentProblem):
         """Return the network of the best epoch, and its number of epochs."""
         method, basis, rate = self.method, self.basis * scale, point["learning_rate"]
         network = TrainedModule(reader, {}, basis, method_kind(method), method.model_dump_json(), dict(point))
-        length = Length(method.epochs, method.batch, method.patience)
-        layers, epochs = train_reader(network.module, parts, (rate, method.weight_decay), length, seed)
+        layers, epochs = train_reader(network.module, parts, method, rate, seed)
         return replace(network, layers=layers), epochs
 
 

@@ -171,15 +171,11 @@ class RecurrentProblem(PathProblem):
 
     def learn(self, reader: SequenceReader, parts: Any, point: Point, scale: float, seed: int) -> tuple[Any, int]:
         """Return a network trained on parts of the data, see `train_reader`, and its epochs; outputs have a scale."""
-        from shipid.hybrid.training import GATED_LAYERS, GatedModule, Length, train_reader  # a study needs no PyTorch
+        from shipid.hybrid.training import GATED_LAYERS, GatedModule, train_reader  # a study is read without PyTorch
 
-        method, outputs = self.method, 2 * self.basis.shape[1]
-        length, rates = (
-            Length(method.epochs, method.batch, method.patience),
-            (point["learning_rate"], method.weight_decay),
-        )
-        sizes = len(reader.past.names), len(reader.now.names), method.units, outputs
-        trained, epochs = train_reader(lambda: GatedModule(*sizes), parts, rates, length, seed)
+        sizes = len(reader.past.names), len(reader.now.names), self.method.units, 2 * self.basis.shape[1]
+        rate = point["learning_rate"]
+        trained, epochs = train_reader(lambda: GatedModule(*sizes), parts, self.method, rate, seed)
         layers = {name: trained[own] for name, own in GATED_LAYERS.items()}
         scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
         return GatedNetwork(reader, scaled, self.basis), epochs

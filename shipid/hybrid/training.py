@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, pi
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,19 +19,6 @@ Part = tuple[Sequence[tuple[Array | list[Array], ...]], Array]
 """What a network reads, arrays (..., S, d), then its mirror image if there is one; and outputs (S, 2 r)."""
 
 
-@dataclass(frozen=True)
-class Length:
-    """How long networks are trained: `epochs` at most.
-
-    batch : samples per optimiser step; 0 = all of them.
-    patience : epochs without a better validation loss after which training stops; 0 = it never does.
-    """
-
-    epochs: int
-    batch: int = 0
-    patience: int = 0
-
-
 class NetworkTraining:
     """One network that is trained on the mean squared error, some epochs at a time; that of the best epoch is kept.
 
@@ -39,6 +26,7 @@ class NetworkTraining:
     ----------
     build : makes the network.
     parts : what it learns from, and what it is judged by.
+    method : its settings `epochs`, `batch` (0: all samples) and `patience` (0: without end).
     rate : epoch, from 0 -> learning rate of AdamW. decay : decoupled; without it AdamW is Adam.
     seed : of the initial weights, drop-out and the order of the samples in batches.
     device : a PyTorch device.
@@ -50,13 +38,13 @@ class NetworkTraining:
         self,
         build: Callable[[], torch.nn.Module],
         parts: Sequence[Part],
-        length: Length,
+        method: Any,
         rate: Callable[[int], float],
         decay: float,
         seed: int,
         device: str = "cpu",
     ) -> None:
-        self.length, self.rate, self.epochs, self.waited, self.running = length, rate, 0, 0, True
+        self.method, self.rate, self.epochs, self.waited, self.running = method, rate, 0, 0, True
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.network, self.state = build().float().to(device), torch.get_rng_state()
@@ -87,7 +75,7 @@ class NetworkTraining:
         total, count = 0.0, len(self.seen[0][1])
         for group in self.optimiser.param_groups:
             group["lr"] = self.rate(self.epochs)
-        batch = self.length.batch or count
+        batch = self.method.batch or count
         for rows in torch.split(torch.randperm(count), batch) if batch < count else [slice(None)]:
             self.network.train(
                 isinstance(rows, slice) or len(rows) > 1
@@ -107,7 +95,7 @@ class NetworkTraining:
             self.best, self.running = np.nan, False
         elif better:
             self.best, self.kept = judged, self._layers()
-        self.running &= self.waited < (self.length.patience or np.inf)
+        self.running &= self.waited < (self.method.patience or np.inf)
 
     def _loss(self, part: int, rows: Tensor | slice) -> Tensor:
         """Mean squared error of rows of a part (S, 2 r); with an image, x is made even and y odd."""
@@ -165,18 +153,18 @@ GATED_LAYERS = {
 
 
 def train_reader(
-    build: Callable[[], torch.nn.Module], parts: Sequence[Part], rates: tuple[float, float], length: Length, seed: int
+    build: Callable[[], torch.nn.Module], parts: Sequence[Part], method: Any, learning_rate: float, seed: int
 ) -> tuple[dict[str, Array], int]:
     """Train what reads past and present to the end: layers by name, number of epochs.
 
-    rates : of learning, which falls to 0 by half a cosine, and of decay.
+    method : as in `NetworkTraining`, and `weight_decay`. learning_rate : at the start; it falls by half a cosine to 0.
     """
 
     def rate(epoch: int) -> float:
-        return rates[0] * (1 + cos(pi * epoch / length.epochs)) / 2
+        return learning_rate * (1 + cos(pi * epoch / method.epochs)) / 2
 
-    training = NetworkTraining(build, parts, length, rate, rates[1], seed)
-    training.advance(length.epochs)
+    training = NetworkTraining(build, parts, method, rate, method.weight_decay, seed)
+    training.advance(method.epochs)
     return training.kept, training.epochs
 
 

@@ -5,7 +5,8 @@ import pytest
 import torch
 
 from shipid.hybrid import training
-from shipid.hybrid.training import Length, NetworkTraining, tanh_network
+from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.training import NetworkTraining, tanh_network
 
 torch.set_num_threads(1)
 TRAIN, VAL = np.arange(96), np.arange(96, 128)
@@ -24,7 +25,12 @@ def begun(x, y, seed, *, rate=1e-2, decay=0.0, units=8, dropout=(0.0, 0.0), judg
     parts = [([(x[rows],)], y[rows]) for rows in (TRAIN, judged)]
     widths = [x.shape[1], units, units, y.shape[1]]
     return NetworkTraining(
-        lambda: tanh_network(widths, *dropout), parts, Length(**{"epochs": 30, **length}), lambda _: rate, decay, seed
+        lambda: tanh_network(widths, *dropout),
+        parts,
+        PathTrained(**{"epochs": 30, "patience": 0, **length}),
+        lambda _: rate,
+        decay,
+        seed,
     )
 
 
