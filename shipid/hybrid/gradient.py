@@ -58,7 +58,7 @@ def tune_gradient(task: Task, method: Any) -> dict[str, FitResult]:
                 best[key] = row, networks
         for number in range(first, first + len(asked) // len(search.rows)):
             search.record({key: outcomes[key, number][0] for key in search.rows})
-    return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in search.rows}
+    return {key: trainer.fitted(key, search.rows, best.get(key)) for key in search.rows}
 
 
 class _FoldTraining(NamedTuple):
@@ -123,21 +123,15 @@ class _Trainer:
             outcomes[trial] = row, tuple(map(_trained_network, members))
         return outcomes
 
-    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None, at_once: int) -> FitResult:
-        """The networks of the best trial; those of an earlier session are trained once more, in the same company."""
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None) -> FitResult:
+        """The networks of the best trial; those of an earlier session are trained once more."""
         seconds = sum(row["seconds"] for row in rows[key])
         kept = best_trials(rows[key])
         if not kept:
             return FitResult(None, rows[key], seconds)
         number = kept[0]["number"]
         if best is None or number != best[0]["number"]:
-            first = number - number % at_once
-            again = {  # those that raced together
-                (name, place): rows[name][place]["params"]
-                for place in range(first, min(first + at_once, len(rows[key])))
-                for name in rows
-            }
-            best = self.train(again)[key, number]
+            best = self.train({(key, number): kept[0]["params"]})[key, number]
         return FitResult(Compensator(self.inputs, best[1], kept[0]["params"]), rows[key], seconds)
 
 
