@@ -201,11 +201,6 @@ class PredictorInputs:
             estimates,
         )
 
-    @cached_property
-    def path(self) -> Any:
-        """Path (T, 1, 2) of the physics alone [m]; zeros without physics."""
-        return self.physics.paths(self.instants)
-
     @property
     def diverges(self) -> MX:
         """Whether the rollout of the physics diverges; never without physics."""
