@@ -74,7 +74,9 @@ class ExportModel:
         known = PredictorInputs(self.physics, self.layout)
         physics, method = SymbolicPhysics(**vars(self.predictor.physics)), self.predictor.method
         try:
-            predicted: Any = symbolic_corrector(corrector).predict(physics, known.instants, physics.paths(known.instants))
+            predicted: Any = symbolic_corrector(corrector).predict(
+                physics, known.instants, physics.paths(known.instants)
+            )
             path = MX(predicted.reshape(physics.horizon, 2)).T
         except (
             ShipidError,
