@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from torch import Tensor
+from torch.func import functional_call
 
 from shipid.errors import ResultError
 from shipid.hybrid.method import Array
@@ -30,7 +31,7 @@ from shipid.hybrid.recurrent import (
     Sequences,
 )
 from shipid.hybrid.search import Point, SearchProblem
-from shipid.hybrid.training import train_reader
+from shipid.hybrid.training import Length, train_reader
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,25 @@ class NetworkProblem(RecurrentProblem):
         """Return the network of the best epoch, and its number of epochs."""
         method, basis, rate = self.method, self.basis * scale, point["learning_rate"]
         network = TrainedModule(reader, {}, basis, method_kind(method), method.model_dump_json(), dict(point))
-        layers, epochs = train_reader(network.module, parts, method, rate, seed)
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            module = network.module().float()
+            learned = {name: layer for name, layer in module.named_parameters() if layer.requires_grad}
+            layers, epochs = train_reader(
+                parts,
+                lambda layers, *seen: functional_call(  # one window alone has no spread that BatchNorm could learn
+                    module.train(torch.is_grad_enabled() and len(seen[1]) > 1), dict(layers), seen
+                ),
+                torch.nn.utils.parameters_to_vector(learned.values()).detach()[None].clone(),
+                {name: tuple(layer.shape) for name, layer in learned.items()},
+                (rate, method.weight_decay),
+                Length(method.epochs, method.batch, method.patience),
+                torch.Generator().manual_seed(seed),
+                lambda: {
+                    name: held.numpy(force=True).copy()
+                    for name, held in (*module.named_parameters(), *module.named_buffers())
+                },
+            )
         return replace(network, layers=layers), epochs
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Memory
+from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.search import Probability, Scale, SearchMethod
 
@@ -58,8 +58,15 @@ class PathTrained(SearchMethod):
     memory: Memory = Memory()
     at_once: PositiveInt = 1
 
+    @property
+    def together(self) -> bool:
+        """Networks of one architecture train as one stack; where it is searched, hardly any two are alike."""
+        return not any(isinstance(getattr(self, name), tuple) for name in self.COUNTS)
+
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
+        from shipid.hybrid.training import Length
 
-        return tune_gradient(task, self)
+        inputs, length = Inputs(task.commands, self.memory), Length(self.epochs, self.batch, self.patience)
+        return tune_gradient(task, self, inputs, length, self.at_once)

@@ -170,13 +170,12 @@ class RecurrentProblem(PathProblem):
         return self.learn(reader, parts, point, scale, seed)
 
     def learn(self, reader: SequenceReader, parts: Any, point: Point, scale: float, seed: int) -> tuple[Any, int]:
-        """Return a network trained on parts of the data, see `train_reader`, and its epochs; outputs have a scale."""
-        from shipid.hybrid.training import GATED_LAYERS, GatedModule, train_reader  # a study is read without PyTorch
+        """Return a network trained on parts of the data, see `train_gated`, and its epochs; outputs have a scale."""
+        from shipid.hybrid.training import Length, train_gated  # a study is read without PyTorch
 
-        sizes = len(reader.past.names), len(reader.now.names), self.method.units, 2 * self.basis.shape[1]
-        rate = point["learning_rate"]
-        trained, epochs = train_reader(lambda: GatedModule(*sizes), parts, self.method, rate, seed)
-        layers = {name: trained[own] for name, own in GATED_LAYERS.items()}
+        method = self.method
+        length = Length(method.epochs, method.batch, method.patience)
+        layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
         scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
         return GatedNetwork(reader, scaled, self.basis), epochs
 

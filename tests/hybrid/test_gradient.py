@@ -7,6 +7,7 @@ import torch
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.training import StackTraining
 from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
@@ -31,6 +32,21 @@ def targets(columns):
     x = steps * columns["u"] + 0.1 * steps**2 * np.tanh(columns["port.n"])
     y = steps * columns["v"] + 0.2 * steps**2 * columns["r"] * columns["port.delta"]
     return {"high-1": np.stack([x, y], axis=-1), "none": np.stack([5.0 * x, -3.0 * y], axis=-1)}
+
+
+def test_equal_architectures_train_as_one_stack_and_others_alone(columns, targets, monkeypatch):
+    stacks = []
+
+    def counted(learners, *args, **kwargs):
+        stacks.append(len(learners))
+        return StackTraining(learners, *args, **kwargs)
+
+    monkeypatch.setattr("shipid.hybrid.gradient.StackTraining", counted)
+    tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=4)
+    assert stacks == [2] * 3
+    stacks.clear()
+    tune(columns, COMMANDS, targets, [FOLD], SEARCHED.model_copy(update={"epochs": 2}), seed=4)
+    assert stacks == [1] * 6
 
 
 def test_the_best_of_a_race_goes_to_the_end(columns, targets):

@@ -12,12 +12,13 @@ import torch
 
 import shipid
 from shipid.errors import ResultError
+from shipid.hybrid import network as networks
 from shipid.hybrid.features import select_inputs
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.network import NetworkMethod
 from shipid.hybrid.recurrent import past_signals
-from shipid.hybrid.training import NetworkTraining
+from shipid.hybrid.training import BestEpochs, train_reader
 from tests.hybrid.quick import small_world
 
 
@@ -96,17 +97,21 @@ def test_a_network_predicts_with_the_buffers_of_its_best_epoch(tmp_path: Path, m
     """Its error on the validation windows is the least that was seen in training; also when it was read back."""
     bests, watched, built = [], [], []
 
-    class Recorded(NetworkTraining):
+    class Recorded(BestEpochs):
         def __init__(self, *args: Any) -> None:
             super().__init__(*args)
             bests.append(self)
-            watched.append(args[1][1])
+
+    def trained(parts: Any, *args: Any) -> Any:
+        watched.append(parts[1])
+        return train_reader(parts, *args)
 
     def network(_: Any, point: Any, *sizes: int) -> torch.nn.Module:  # noqa: ARG001
         built.append(Held(*sizes))
         return built[-1]
 
-    monkeypatch.setattr("shipid.hybrid.training.NetworkTraining", Recorded)
+    monkeypatch.setattr("shipid.hybrid.training.BestEpochs", Recorded)
+    monkeypatch.setattr(networks, "train_reader", trained)
     monkeypatch.setattr(Buffered, "network", network)
     world = small_world()
     method = Buffered(trials=1, epochs=300, patience=4, seconds=3.0, mirror=False, learning_rate=0.1)
@@ -116,10 +121,10 @@ def test_a_network_predicts_with_the_buffers_of_its_best_epoch(tmp_path: Path, m
     np.testing.assert_array_equal(read.predict(instants), predictor.predict(instants))
     corrector: Any = read.corrector
     for trained_one, best, (seen, outputs) in zip(corrector.networks, bests, watched, strict=True):
-        assert 4 < best.epochs < 300
-        assert best.waited == 4  # the last epoch is not the best one
+        assert 4 < best.epochs[0] < 300
+        assert best.waited[0] == 4  # the last epoch is not the best one
         error = np.square(trained_one._outputs(seen[0]) - outputs).mean()
-        assert error == pytest.approx(best.best, rel=1e-4)
+        assert error == pytest.approx(float(best.best[0]), rel=1e-4)
     first = built[0]  # in training; what it does not learn it keeps
     held = corrector.networks[0].layers
     for name in ("frequencies", "shift", "gain"):
