@@ -83,6 +83,7 @@ MOST_FILTER_STEPS = 1000  # steps of the filters between two rows: rows further 
 LONGEST_PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the physics did is worse than to begin anew
 STEP_SLACK = 1e-5  # of a step: so much longer than the longest it is still one
 CALM_WIND = 1e-6  # m/s: keeps the direction of no wind defined
+TRACE_OF_WIND = 1e-12  # m/s: of a wind that is exactly 0, so that its direction has a derivative
 NotNegativeNumber = Annotated[FiniteFloat, Field(ge=0)]
 PositiveNumber = Annotated[FiniteFloat, Field(gt=0)]
 
@@ -593,12 +594,13 @@ def observed_start(
     if "V_w" in environment:
         V_w, beta_w = environment["V_w"], environment["beta_w"]
         ahead, across = V_w * np.cos(beta_w) - north, V_w * np.sin(beta_w) - east
+        ahead = ahead + np.where(ahead**2 + across**2 == 0, TRACE_OF_WIND, 0.0)
         environment |= {"V_w": np.hypot(ahead, across), "beta_w": np.arctan2(across, ahead)}
     environment |= {name: zero for name in ("V_c", "beta_c") if name in environment}
     now = np.stack([columns[f"observer.{name}"] for name in "XYN"], axis=1) @ filters.mass.T
     ages = (np.arange(horizon) + 0.5) * step
     faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(horizon)
-    return ObservedStart(begun, environment, np.asarray(faded[:, None, None] * now), np.stack([north, east]))
+    return ObservedStart(begun, environment, faded[:, None, None] * now, np.stack([north, east]))
 
 
 def estimates_at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:

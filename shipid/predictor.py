@@ -30,10 +30,9 @@ from shipid.errors import DataError, ResultError, ShipidError, suggest_name
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrate_bands
-from shipid.hybrid.contract import fault_of_corrector, name_of_class
 from shipid.hybrid.deployed import DeployedMethod, reason_of_no_band
 from shipid.hybrid.mean import MeanCorrector
-from shipid.hybrid.method import Case, Index, Method, Task, fit_all, widen_range
+from shipid.hybrid.method import Case, Index, Method, Task, fault_of_corrector, fit_all, name_of_class, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.novelty import NoveltyAlarm, alarm_inputs, calibrate_alarm
 from shipid.hybrid.physics import Physics, check_columns, check_instants

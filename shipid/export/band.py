@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.export.correctors import distance_to_nearest, stacked_inputs
-from shipid.export.known import NamedExpressions, PredictorInputs, all_within, column_of_entries
-from shipid.hybrid.bands import FEWEST, LEVELS, Bands, FastMotion, fast_filters
+from shipid.export.correctors import distance_to_nearest
+from shipid.export.known import NamedExpressions
+from shipid.hybrid.bands import FEWEST, LEVELS, Bands, track_directions
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.novelty import NoveltyAlarm, range_of_orders, range_rounding
 
 BAND_CHOICE = ("level", "pointwise", "kind")
 """Inputs of a band: its level, whether each step is taken alone (0 or 1), the kind of manoeuvre (0: any)."""
@@ -36,70 +35,23 @@ def half_axes_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
 
 
 def band_rows(
-    bands: Bands, now: NamedExpressions, path: MX, step: float, half: MX, past: Sequence[NamedExpressions] = ()
+    bands: Bands, now: NamedExpressions, path: MX, step: float, half: MX, past: Mapping[str, Any] | None = None
 ) -> MX:
     """Rows (4, T) of `BAND_ROWS` around a path (2, T) of steps [s]; half axes (T, 2), rows of the past."""
-    point = column_of_entries(now, bands.names) / ca.DM(bands.spread)
-    grown = _band_growth(bands, path, now["r"], step, distance_to_nearest(point, bands.centres / bands.spread))
-    if bands.fast is not None:
-        grown *= _fast_growth(bands.fast, [*past[-bands.fast.past :], now])
-    return ca.vertcat(grown * half.T, _track_directions(path))
+    columns: dict[str, Any] = {name: ca.ArrayInterface.MX(now[name], shape=(1,)) for name in (*MOTIONS, *bands.names)}
+    paths: Any = ca.ArrayInterface.MX(path.T, shape=(path.shape[1], 1, 2))
+    grown = MX(SymbolicBands(**vars(bands)).growth(paths, columns, step, past))
+    ahead: Any = track_directions(paths)
+    return ca.vertcat(grown * half.T, MX(ahead.reshape(path.shape[1], 2)).T)
 
 
-def _fast_growth(fast: FastMotion, rows: Sequence[NamedExpressions]) -> MX:
-    """How much wider the band is in fast motion, as `FastMotion.growth`."""
-    series = [ca.vertcat(*(row[name] for row in rows)) for name in MOTIONS]
-    filters = [ca.DM(one) for one in fast_filters(len(rows))]
-    powers = ca.vertcat(*(ca.sumsqr(ca.mtimes(one, values)) / len(rows) for values in series for one in filters))
-    return MX(ca.sqrt(ca.fmax(ca.mmax(powers * ca.DM(fast.weights)), 1)))
+class SymbolicBands(Bands):
+    """Bands of symbols."""
 
-
-def is_alarm_raised(alarm: NoveltyAlarm, known: PredictorInputs) -> MX:
-    """Whether the alarm is raised, as `NoveltyAlarm.is_raised`."""
-    table, measured = known.table(alarm.inputs), MX(1)
-    for name in alarm.inputs.commands:
-        series = ca.vertcat(*(row[name] for row in known.past[len(known.past) - alarm.past :]), known.now[name])
-        table[range_of_orders(name)] = ca.mmax(series) - ca.mmin(series)  # these pass over NaN
-        measured = ca.logic_and(measured, all_within(series))
-    away = ca.mtimes(ca.DM(alarm.root.T), stacked_inputs(table, alarm.names) - ca.DM(alarm.middle))
-    rounding, values = ca.DM(range_rounding(alarm.low, alarm.high)), stacked_inputs(table, alarm.limited)
-    slack = alarm.slack * ca.fmax(ca.DM(alarm.high - alarm.low), rounding) + rounding
-    reach = ca.vertcat(ca.DM(alarm.low) - values, values - ca.DM(alarm.high)) - ca.vertcat(slack, slack)
-    inside = ca.logic_and(ca.norm_2(away) <= alarm.farthest, ca.sum1(reach <= 0) > reach.numel() - 0.5)
-    return ca.logic_not(ca.logic_and(inside, measured))
-
-
-def _track_directions(path: MX) -> MX:
-    """Unit vectors (2, T) along a path, as `shipid.hybrid.bands.track_directions`; ahead where it does not move."""
-    first = ca.horzcat(MX(np.zeros((2, 1))), path[:, :-1])
-    chords = ca.horzcat(path[:, 1:] - first[:, :-1], path[:, -1] - first[:, -1])
-    length = ca.sqrt(ca.sum1(chords**2))
-    moves = ca.repmat(length > 1e-12 * ca.mmax(length), 2, 1)
-    ahead = ca.repmat(ca.DM([1, 0]), 1, path.shape[1])
-    return ca.if_else(moves, chords / ca.if_else(moves, ca.repmat(length, 2, 1), 1), ahead)
-
-
-def _band_growth(bands: Bands, path: MX, r: MX, step: float, nearest_: MX) -> MX:
-    """How much wider the band is than that of an average prediction, as `Bands.growth`."""
-    away, horizon = nearest_ / np.sqrt(bands.centres.shape[1]), path.shape[1]
-    ends = [MX(np.zeros(2)), *(path[:, -(-horizon * part // 3) - 1] for part in (1, 2, 3))]
-    chords = [after - before for before, after in itertools.pairwise(ends)]
-    length = sum(ca.sqrt(ca.sumsqr(chord)) for chord in chords)
-    turns = []
-    for one, other in itertools.pairwise(chords):
-        dot = ca.dot(one, other)
-        turns.append(ca.atan2(one[0] * other[1] - one[1] * other[0], ca.if_else(dot == 0, 0, dot)))  # 0 and not -0
-    first, second = turns
-    traits = ca.vertcat(
-        ca.log(length / bands.length + 0.02),
-        ca.fabs(first + second),
-        ca.fabs(second - first),
-        ca.fmin(ca.fabs(first + second - r * step * horizon * 2 / 3), np.pi),
-        ca.log(1 + ca.fmin(away, bands.far)),
-    )
-    seen = ca.fmin(ca.fmax(traits, ca.DM(bands.low)), ca.DM(bands.high))
-    harder = ca.dot((seen - ca.DM(bands.middle)) / ca.DM(bands.deviation), ca.DM(bands.slopes))
-    return MX(ca.exp(harder) * ca.fmax(away / bands.far, 1))
+    def away(self, points: Any) -> Any:
+        """Distance (1,) of points (1, d) from the windows of training."""
+        nearest = distance_to_nearest(MX(points / self.spread).T, self.centres / self.spread)
+        return ca.ArrayInterface.MX(nearest / np.sqrt(self.centres.shape[1]), shape=(1,))
 
 
 def is_band_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:

@@ -12,7 +12,7 @@ import casadi as ca
 from shipid.engine.integrate import Method
 from shipid.export.band import BAND_CHOICE, BAND_ROWS
 from shipid.export.c import rename_function
-from shipid.export.equations import Equations
+from shipid.export.equations import Equations, step_function
 from shipid.export.model import ExportModel
 from shipid.files import json_text, write_set
 from shipid.version import __version__
@@ -27,7 +27,7 @@ def write_vessel_function(vessel: Vessel, name: str, method: Method, file: Path)
         "defaults": {"parameters": list(vessel.parameters.values())},
     }
     inputs, outputs = {**equations.groups, "dt": {"dt": "s"}}, {"after": equations.groups["carry"]}
-    return _write_function(equations.step(method), name, file, described, inputs, outputs)
+    return _write_function(step_function(equations.model, method), name, file, described, inputs, outputs)
 
 
 def write_predictor_function(model: ExportModel, name: str, file: Path) -> list[Path]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -14,7 +14,7 @@ from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate_step
 from shipid.physics.grammar import AXES
 from shipid.physics.signals import ACTUAL, SIGNALS, signal_of, signal_row
-from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
+from shipid.simulation.log import horizontal_velocities, state_column
 from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -73,55 +73,14 @@ class Equations:
             "parameters": {name: self.vessel.units[name] for name in model.parameters},
         }
 
-    def _symbols(self) -> list[SX]:
-        return [
-            SX.sym("state", len(self.states)),
-            *(SX.sym(name, len(getattr(self.model, name))) for name in INPUTS[1:]),
-        ]
-
-    @cached_property
-    def rates(self) -> ca.Function:
-        """(state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt."""
-        inputs, tau = self._symbols(), SX.sym("tau_extra", self.model.num_dof)
-        calm = replace(self.model, sums=tuple(term for term in self.model.sums if term.arrays is not None))
-        given = dict(zip((*INPUTS, "tau_extra"), (*inputs, tau), strict=True))
-        return function_by_names("rates", given, {"rates": SX(summed_rates(calm, inputs, tau, {}))}, cse=True)
-
-    @cached_property
-    def advance(self) -> ca.Function:
-        """(memory, commands, parameters, dt) -> memory after dt; neither state nor weather moves an actuator."""
-        state, memory, commands, environment, parameters = self._symbols()
-        dt = SX.sym("dt")
-        after = self.model.advance(0 * state, memory, commands, 0 * environment, parameters, dt)
-        inputs = {"memory": memory, "commands": commands, "parameters": parameters, "dt": dt}
-        return function_by_names("advance", inputs, {"after": SX(after)}, cse=True)
-
-    def step(self, method: Method, step: float | None = None) -> ca.Function:
-        """(carry, commands, environment, loads, parameters) -> carry after `step` [s], or after a sixth input `dt`."""
-        states = len(self.states)
-        inputs = symbols_of({group: len(units) for group, units in self.groups.items()} | ({} if step else {"dt": 1}))
-        carry, commands, environment, loads, parameters = (*inputs.values(),)[:5]
-
-        def rates(x: MX, m: MX) -> MX:
-            return self.rates(x, m, commands, environment, parameters, loads)
-
-        def advance(m: MX, after: Any) -> MX:
-            return self.advance(m, commands, parameters, after) if self.model.memory else m
-
-        length: Any = step or inputs["dt"]
-        after = integrate_step(
-            rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method
-        )
-        return function_by_names("step", inputs, {"after": ca.vertcat(*after)})
-
     def functions(self, method: Method) -> dict[str, ca.Function]:
         """`step`, and of its inputs but `dt`: `rates`, and `begin`, the carry with actuators at their orders."""
         inputs, count = symbols_of({group: len(units) for group, units in self.groups.items()}), len(self.states)
         carry, commands, environment, loads, parameters = inputs.values()
-        rates = self.rates(carry[:count], carry[count:], commands, environment, parameters, loads)
+        rates = calm_rates(self.model)(carry[:count], carry[count:], commands, environment, parameters, loads)
         begun = ca.vertcat(carry[:count], self.begun(commands, parameters))
         return {
-            "step": self.step(method),
+            "step": step_function(self.model, method),
             "rates": function_by_names("rates", inputs, {"rates": rates}),
             "begin": function_by_names("begin", inputs, {"begun": begun}),
         }
@@ -129,20 +88,57 @@ class Equations:
     def begun(self, commands: MX, parameters: MX) -> MX:
         """Memories that have reached their orders, as far as their stops let them."""
         places = [self.model.commands.index(name) for name in self.model.memory]
-        return MX(self.advance(commands[places], commands, parameters, 0)) if places else MX(0, 1)
-
-    def aboard(self, state: MX) -> MX:
-        """State with velocities along the ship's axes from one with horizontal u, v, r, as a log has them."""
-        if set(self.model.state).isdisjoint(LEANING):
-            return state
-        now = split_by_name(self.states, state)
-        return MX(ca.vertcat(*(now | body_velocities(now, ca)).values()))
+        return MX(memory_advance(self.model)(commands[places], commands, parameters, 0)) if places else MX(0, 1)
 
     def horizontal(self, carries: MX) -> MX:
         """u, v, r in the horizontal plane of one carry, or of a column for each step."""
         return MX(
             ca.vertcat(*horizontal_velocities(split_by_name((*self.states, *self.model.memory), carries), ca).values())
         )
+
+
+def _input_symbols(model: Dynamics) -> list[SX]:
+    states = SX.sym("state", len(model.state) + len(model.hidden))
+    return [states, *(SX.sym(name, len(getattr(model, name))) for name in INPUTS[1:])]
+
+
+@lru_cache(maxsize=32)
+def calm_rates(model: Dynamics) -> ca.Function:
+    """(state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt, of all vessels of one structure."""
+    inputs, tau = _input_symbols(model), SX.sym("tau_extra", model.num_dof)
+    calm = replace(model, sums=tuple(term for term in model.sums if term.arrays is not None))
+    given = dict(zip((*INPUTS, "tau_extra"), (*inputs, tau), strict=True))
+    return function_by_names("rates", given, {"rates": SX(summed_rates(calm, inputs, tau, {}))}, cse=True)
+
+
+@lru_cache(maxsize=32)
+def memory_advance(model: Dynamics) -> ca.Function:
+    """(memory, commands, parameters, dt) -> memory after dt; neither state nor weather moves an actuator."""
+    state, memory, commands, environment, parameters = _input_symbols(model)
+    dt = SX.sym("dt")
+    after = model.advance(0 * state, memory, commands, 0 * environment, parameters, dt)
+    inputs = {"memory": memory, "commands": commands, "parameters": parameters, "dt": dt}
+    return function_by_names("advance", inputs, {"after": SX(after)}, cse=True)
+
+
+@lru_cache(maxsize=32)
+def step_function(model: Dynamics, method: Method, step: float | None = None) -> ca.Function:
+    """(carry, commands, environment, loads, parameters) -> carry after `step` [s], or after a sixth input `dt`."""
+    states = len(model.state) + len(model.hidden)
+    sizes = {"carry": states + len(model.memory), "commands": len(model.commands)}
+    sizes |= {"environment": len(model.environment), "loads": model.num_dof, "parameters": len(model.parameters)}
+    inputs = symbols_of(sizes | ({} if step else {"dt": 1}))
+    carry, commands, environment, loads, parameters = (*inputs.values(),)[:5]
+
+    def rates(x: MX, m: MX) -> MX:
+        return calm_rates(model)(x, m, commands, environment, parameters, loads)
+
+    def advance(m: MX, after: Any) -> MX:
+        return memory_advance(model)(m, commands, parameters, after) if model.memory else m
+
+    length: Any = step or inputs["dt"]
+    after = integrate_step(rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method)
+    return function_by_names("step", inputs, {"after": ca.vertcat(*after)})
 
 
 def _unit_of_entry(name: str) -> str:

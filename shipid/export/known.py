@@ -1,25 +1,29 @@
-"""Inputs of a predictor at an instant as symbols, and what physics and memory compute from them."""
+"""Inputs of a predictor at an instant as symbols, and its physics on them.
+
+They are arrays of CasADi with the functions of NumPy: what a method computes for S instants is an expression for one.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import MX
 
+from shipid.data.windows import Instants
+from shipid.engine.engines import AUTO
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.equations import Equations, rollout_records, split_by_name, symbols_of
-from shipid.hybrid.features import MOTIONS, PLAN_PARTS, Inputs, count_steps
-from shipid.hybrid.physics import Physics
-from shipid.observer import ESTIMATE_COLUMNS, filter_bank, moves_start
-from shipid.physics.signals import direct_inputs
+from shipid.export.equations import Equations, rollout_records, split_by_name, step_function, symbols_of
+from shipid.hybrid.features import MOTIONS
+from shipid.hybrid.physics import Physics, positions_in_frame
+from shipid.vessel.dynamics import vessel_dynamics
 
-NamedExpressions = Mapping[str, MX]
-TRACE_OF_WIND = 1e-12  # m/s: of a wind that is exactly 0, so that its direction has a derivative
+NamedExpressions = Mapping[str, Any]
 POSITION_ENTRIES = ("north", "east")
 
 
@@ -40,12 +44,6 @@ class InputLayout:
     horizon: int
     estimates: tuple[str, ...]
     commands: tuple[str, ...]
-
-    def before(self, steps: int) -> int:
-        """Row of the past so many steps before the instant; IndexError where the past is shorter."""
-        if steps > self.num_past:
-            raise IndexError(f"{steps} steps of the past are taken, of {self.num_past}")
-        return self.num_past - steps
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -75,209 +73,140 @@ def turn_vectors(vectors: MX, angle: MX) -> MX:
     return ca.vertcat(c * vectors[0, :] - s * vectors[1, :], s * vectors[0, :] + c * vectors[1, :])
 
 
-class PredictorInputs:
-    """Symbols of the inputs of a predictor, and the motion of its physics.
+def rows_by_name(names: Sequence[str], values: MX, *shape: int) -> dict[str, Any]:
+    """Rows of a matrix (n, T) by name, as arrays (T, 1), or of this shape."""
+    rows = zip(names, ca.vertsplit(values) if names else (), strict=True)
+    return {name: ca.ArrayInterface.MX(row.T, shape=shape or row.T.shape) for name, row in rows}
 
-    physics : as in the predictor, its vessel with the terms of a method. inputs : name -> symbol of `Layout.sizes`.
-    """
 
-    def __init__(self, physics: Physics, names: InputLayout) -> None:
-        self.physics, self.names = physics, names
-        self.inputs = symbols_of(names.sizes)
-        self.now = split_by_name(names.now, self.inputs["now"])
-        rows = ca.reshape(self.inputs["past"], len(names.past), names.num_past)
-        self.past = [split_by_name(names.past, row) for row in ca.horzsplit(rows)] if names.past else []
-        self.past_errors: dict[float, MX] = {}
+@dataclass(frozen=True)
+class SymbolicPhysics(Physics):
+    """Physics whose instants hold symbols, of one instant."""
 
-    @cached_property
-    def equations(self) -> Equations:
-        """Equations of the physics."""
-        assert self.physics.vessel is not None
-        return Equations(self.physics.vessel)
+    def records(self, instants: Instants) -> MX:
+        """Carries (n, T + 1) after 0..T steps, see `Equations`; with an observer those in the moving water."""
+        start, commands, environment, slow, _ = self._inputs(instants)
+        equations, model = Equations(self.ship), vessel_dynamics(self.ship)
 
-    @cached_property
-    def step(self) -> ca.Function:
-        """One step of the physics."""
-        return self.equations.step(self.physics.integrator, self.physics.step)
+        def rows(names: Sequence[str], table: Mapping[str, Any]) -> MX:
+            return ca.vertcat(*(MX(table[name]).T for name in names)) if names else MX(0, 1)
 
-    def commands(self, names: Sequence[str]) -> MX:
-        """Commands (n, T) over the horizon, or (n, 1) where they are held."""
-        every, horizon = self.names.planned, self.names.horizon
-        if not every:
-            return column_of_entries(self.now, names)
-        return ca.reshape(self.inputs["planned"], len(every), horizon)[[every.index(name) for name in names], :]
-
-    def _begun(self, row: NamedExpressions) -> MX:
-        """State of the vessel at a measured row, at the origin; hidden states of terms are 0."""
-        known = {name: value for name, value in row.items() if name not in POSITION_ENTRIES}
-        return self.equations.aboard(column_of_entries(known, self.equations.states))
-
-    def _rolled_out(self, begun: MX, environment: MX, tau: MX) -> MX:
-        inputs = [self.commands(self.equations.model.commands), environment, tau]
-        carry = ca.vertcat(begun, self.inputs["reached"])
-        return rollout_records(self.step, carry, inputs, self.equations.values, self.names.horizon)
-
-    @cached_property
-    def measured_records(self) -> MX:
-        """Carries (n, T) of the physics after each step from the measured state, without an observer."""
-        model = self.equations.model
-        return self._rolled_out(
-            self._begun(self.now), column_of_entries(self.now, model.environment), MX(np.zeros(model.num_dof))
+        orders = rows(model.commands, commands)
+        reached = split_by_name(model.commands, orders[:, 0]) if instants.hidden is None else instants.hidden
+        carry = ca.vertcat(column_of_entries(start, equations.states), rows(tuple(model.memory), reached))
+        tau = MX(np.zeros(model.num_dof)) if slow is None else MX(slow.reshape(self.horizon, model.num_dof)).T
+        step, inputs = (
+            step_function(model, self.integrator, self.step),
+            [orders, rows(model.environment, environment), tau],
         )
+        return ca.horzcat(carry, rollout_records(step, carry, inputs, equations.values, self.horizon))
 
-    @cached_property
-    def records(self) -> MX:
-        """Carries (n, T) of the physics after each step; with an observer those in the moving water."""
-        return self.measured_records if self.physics.observer is None else self._rolled_out(*self._observed())
+    def is_slow(self, records: MX) -> MX:
+        """Whether no velocity of some carries is above that of any ship: in Python the rollout diverged."""
+        num_dof = vessel_dynamics(self.ship).num_dof
+        return all_within(records[num_dof : 2 * num_dof, :], SPEED_LIMIT)
 
-    @cached_property
-    def seen(self) -> dict[str, MX]:
-        """Estimates of the observer by their names in `shipid.observer.ESTIMATE_COLUMNS`."""
-        return split_by_name(ESTIMATE_COLUMNS, self.inputs["estimates"])
+    def positions(self, instants: Instants, records: MX) -> tuple[Any, Any]:
+        """Positions (T, 1) [m] in the frame (11) of some carries, over ground."""
+        north, east = rows_by_name(POSITION_ENTRIES, records[:2, 1:]).values()
+        drift = self._inputs(instants)[-1]
+        if drift is not None:
+            ages = self.step * np.arange(1.0, self.horizon + 1)[:, None]
+            north, east = north + ages * drift[0], east + ages * drift[1]
+        return positions_in_frame(instants, north, east)
 
-    def _observed(self) -> tuple[MX, MX, MX]:
-        """State, environment and slow force over the horizon, as `shipid.observer.observed_start`."""
-        physics, model, now, seen = self.physics, self.equations.model, self.now, self.seen
-        filters = filter_bank(self.equations.vessel, physics.observer)
-        north, east, psi = seen["current_north"], seen["current_east"], seen["psi"]
-        state = {"psi": psi, "r": seen["r"]}
-        if moves_start(filters.settings, physics.path):
-            state |= {name: seen[name] - now[name] for name in POSITION_ENTRIES}
-        state["u"] = seen["u"] - north * ca.cos(psi) - east * ca.sin(psi)
-        state["v"] = seen["v"] + north * ca.sin(psi) - east * ca.cos(psi)
-        weather = dict(now)
-        if "V_w" in model.environment:
-            ahead = now["V_w"] * ca.cos(now["beta_w"]) - north
-            across = now["V_w"] * ca.sin(now["beta_w"]) - east
-            ahead += ca.if_else(ahead**2 + across**2 == 0, TRACE_OF_WIND, 0)
-            weather |= {"V_w": ca.sqrt(ahead**2 + across**2), "beta_w": ca.atan2(across, ahead)}
-        weather |= {name: MX(0) for name in ("V_c", "beta_c")}
-        ages = (np.arange(physics.horizon) + 0.5) * physics.step
-        faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(physics.horizon)
-        force = ca.DM(filters.mass) @ column_of_entries(seen, "XYN")
-        tau = force @ ca.DM(faded).T
-        return column_of_entries(state, self.equations.states), column_of_entries(weather, model.environment), tau
+    def states(self, instants: Instants, *, engine: str = AUTO) -> dict[str, Any]:  # noqa: ARG002
+        """Return x, y, u, v, r and psi after 1..T steps, (T, 1), as `Physics.states`."""
+        equations, records = Equations(self.ship), self.records(instants)
+        motion = rows_by_name(equations.states, records[: len(equations.states), 1:])
+        motion |= rows_by_name(MOTIONS, equations.horizontal(records[:, 1:]))
+        x, y = self.positions(instants, records)
+        lost = ca.ArrayInterface.MX(ca.if_else(self.is_slow(records), 0, np.nan), shape=(1,))
+        return {"x": x + lost, "y": y + lost, **{name: motion[name] + lost for name in (*MOTIONS, "psi")}}
 
-    @cached_property
-    def path(self) -> MX:
-        """Path (2, T) of the physics alone [m], see `shipid.hybrid.physics.hold_velocity`; zeros without physics."""
-        if self.physics.vessel is None:
-            return MX(np.zeros((2, self.names.horizon)))
-        way = self.records[:2, :]
-        if self.physics.observer is not None:
-            ages = ca.DM(self.physics.step * np.arange(1, self.names.horizon + 1))
-            way += column_of_entries(self.seen, ("current_north", "current_east")) @ ages.T
-        path = turn_vectors(way, -self.now["psi"])
-        places, last = [MX(np.zeros(2))], self.physics.step * column_of_entries(self.now, "uv")
-        before, sound = places[0], MX(1)
-        reach = _row_lengths(last) @ ca.DM(np.arange(1, path.shape[1] + 1)).T
+    def reached(self, instants: Instants) -> dict[str, Any]:
+        """Return what the actuators have reached after 0..T steps, (T + 1, 1), as `Physics.reached`."""
+        names = () if self.vessel is None else tuple(vessel_dynamics(self.vessel).memory)
+        return rows_by_name(names, self.records(instants)[-len(names) :, :]) if names else {}
+
+    def paths(self, instants: Instants) -> Any:
+        """Return the path (T, 1, 2) [m], as `Physics.paths`: see `hold_velocity`."""
+        if self.vessel is None:
+            return np.zeros((self.horizon, 1, 2))
+        records = self.records(instants)
+        path = ca.horzcat(*(MX(side) for side in self.positions(instants, records))).T
+        begun = self.step * ca.vertcat(*(MX(instants.columns[name]) for name in "uv"))
+        places, last, before, sound = [MX(np.zeros(2))], begun, MX(np.zeros(2)), MX(1)
+        reach = _row_lengths(begun) @ ca.DM(np.arange(1, self.horizon + 1)).T
         for place in ca.horzsplit(path):
             step = place - before
-            sound = ca.logic_and(sound, step.T @ step <= (SPEED_LIMIT * self.physics.step) ** 2)
+            sound = ca.logic_and(sound, step.T @ step <= (SPEED_LIMIT * self.step) ** 2)
             last, before = ca.if_else(sound, step, last), place
             places.append(ca.if_else(sound, place, places[-1] + last))
         held = ca.horzcat(*places[1:])
         held *= ca.repmat(reach / ca.fmax(_row_lengths(held), reach), 2, 1)
-        return ca.if_else(self._slow(self.records), path, held)
+        return ca.ArrayInterface.MX(ca.if_else(self.is_slow(records), path, held).T, shape=(self.horizon, 1, 2))
+
+    def call_once(self, function: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
+        """Return a function of instants and arrays as one of CasADi: code for each step of a path would be long."""
+        made: list[tuple[ca.Function, dict[str, tuple[int, ...]]]] = []
+
+        def call(at: Instants, *arrays: Any) -> dict[str, Any]:
+            groups = at.columns, at.past, at.hidden or {}
+            given = [*(value for group in groups for value in group.values()), *arrays]
+            if not made:
+                symbols = [MX.sym("given", value.size) for value in given]
+                pairs = zip(symbols, given, strict=True)
+                shaped = (ca.ArrayInterface.MX(symbol, shape=value.shape) for symbol, value in pairs)
+                columns, past, hidden = [dict[str, Any](zip(group, shaped, strict=False)) for group in groups]
+                results = function(Instants(columns, past, hidden=hidden or None), *shaped)
+                flat = [MX(value.reshape(-1)) for value in results.values()]
+                made.append((ca.Function("advance", symbols, flat), {key: one.shape for key, one in results.items()}))
+            one, shapes = made[0]
+            flat = one.call([MX(value.reshape(-1)) for value in given])
+            return {
+                key: ca.ArrayInterface.MX(value, shape=shape)
+                for (key, shape), value in zip(shapes.items(), flat, strict=True)
+            }
+
+        return call
+
+
+class PredictorInputs:
+    """Symbols of the inputs of a predictor.
+
+    physics : with the terms of a method. inputs : name -> symbol of `Layout.sizes`. now : entries by name.
+    """
+
+    def __init__(self, physics: Physics, names: InputLayout) -> None:
+        self.physics, self.names = SymbolicPhysics(**vars(physics)), names
+        self.inputs = symbols_of(names.sizes)
+        self.now = split_by_name(names.now, self.inputs["now"])
+
+    @cached_property
+    def instants(self) -> Instants:
+        """The instant; places are relative to it."""
+        names, given = self.names, self.inputs
+        columns = rows_by_name(names.now, given["now"], 1)
+        estimates = rows_by_name(names.estimates, given["estimates"], 1)
+        for name in POSITION_ENTRIES:
+            place = columns.pop(name)
+            if f"observer.{name}" in estimates:
+                estimates[f"observer.{name}"] = estimates[f"observer.{name}"] - place
+        return Instants(
+            columns,
+            rows_by_name(names.past, ca.reshape(given["past"], len(names.past), names.num_past)),
+            rows_by_name(names.planned, ca.reshape(given["planned"], -1, names.horizon)) if names.planned else None,
+            rows_by_name(names.reached, given["reached"], 1) or None,
+            estimates,
+        )
 
     @property
     def diverges(self) -> MX:
         """Whether the rollout of the physics diverges; never without physics."""
-        return MX(0) if self.physics.vessel is None else ca.logic_not(self._slow(self.records))
-
-    def _slow(self, records: MX) -> MX:
-        """Whether no velocity of some carries is above that of any ship: in Python the rollout diverged."""
-        num_dof = self.equations.model.num_dof
-        return all_within(records[num_dof : 2 * num_dof, :], SPEED_LIMIT)
-
-    def past_records(self, steps: int) -> MX:
-        """Carries (n, steps) over the last steps, from the measured state before them, actuators at their orders."""
-        model, rows = self.equations.model, self.past[self.names.before(steps) :]
-        carry = ca.vertcat(self._begun(rows[0]), column_of_entries(rows[0], tuple(model.memory)))
-        commands = ca.horzcat(*(column_of_entries(row, model.commands) for row in rows))
-        inputs = [commands, column_of_entries(rows[0], model.environment), MX(np.zeros(model.num_dof))]
-        return rollout_records(self.step, carry, inputs, self.equations.values, steps)
-
-    def _past_error(self, seconds: float) -> MX:
-        """x, y, u, v, r of `shipid.hybrid.features.past_error`."""
-        steps = count_steps(seconds, self.physics.step)
-        records, then = self.past_records(steps), self.past[self.names.before(steps)]
-        last, change = records[:, -1], self.now["psi"] - then["psi"]
-        here = turn_vectors(-column_of_entries(then, "xy"), change)  # the present position in the frame of the start
-        missed = turn_vectors(here - turn_vectors(last[:2], -then["psi"]), -change)
-        errors = ca.vertcat(missed, column_of_entries(self.now, MOTIONS) - self.equations.horizontal(last))
-        return ca.if_else(ca.logic_and(all_within(errors), self._slow(records)), errors, 0)
-
-    def table(self, inputs: Inputs, moments: Sequence[int] = ()) -> dict[str, MX]:
-        """Every input that a method may take, see `shipid.hybrid.features.Inputs.table`.
-
-        moments : steps of the horizon at which the physics is seen (calibrator).
-        """
-        table = (
-            feature_expressions(self.now, (*inputs.commands, *inputs.memory.states))
-            | self._plans(inputs)
-            | self._history(inputs)
-        )
         if self.physics.vessel is None:
-            return table
-        if inputs.memory.observer and self.physics.observer is not None:
-            table |= self._estimates()
-        axes = ("x", "y", *MOTIONS)
-        for seconds in inputs.memory.error:
-            if seconds not in self.past_errors:
-                self.past_errors[seconds] = self._past_error(seconds)
-            table |= split_by_name([f"error-{seconds:g}.{name}" for name in axes], self.past_errors[seconds])
-        if moments:
-            every = ca.vertcat(self.path, self.equations.horizontal(self.records))
-            every = ca.if_else(ca.logic_and(all_within(every), self._slow(self.records)), every, 0)
-            for k in moments:
-                table |= split_by_name([f"physics-{k * self.physics.step:g}.{name}" for name in axes], every[:, k - 1])
-        return table
-
-    def _plans(self, inputs: Inputs) -> dict[str, MX]:
-        """Mean order less the present one in parts of the horizon, see `shipid.hybrid.features.planned_means`."""
-        if not self.names.planned:
-            return {}
-        table, horizon = {}, self.names.horizon
-        for name, orders in split_by_name(inputs.commands, self.commands(inputs.commands)).items():
-            component, _, signal = name.rpartition(".")
-            for number, part in enumerate(np.array_split(np.arange(horizon), min(PLAN_PARTS, horizon)), start=1):
-                mean = ca.sum2(orders[:, part[0] : part[-1] + 1]) / len(part)
-                table[f"{component}.planned-{number}.{signal}"] = mean - self.now[name]
-        return table
-
-    def _history(self, inputs: Inputs) -> dict[str, MX]:
-        columns, now, step = {}, self.now, self.physics.step
-        for seconds in inputs.memory.history:
-            row = self.past[self.names.before(count_steps(seconds, step))]
-            for name in (*MOTIONS, *inputs.commands, *inputs.memory.states):
-                component, dot, signal = name.rpartition(".")
-                columns[f"{component}{dot}past-{seconds:g}.{signal}"] = row[name] - now[name]
-        for seconds in inputs.memory.turned:
-            row = self.past[self.names.before(count_steps(seconds, step))]
-            columns[f"turned-{seconds:g}.psi"] = now["psi"] - row["psi"]
-        for seconds in inputs.memory.positions:
-            row = self.past[self.names.before(count_steps(seconds, step))]
-            columns |= {f"past-{seconds:g}.{axis}": row[axis] for axis in "xy"}
-        return columns
-
-    def _estimates(self) -> dict[str, MX]:
-        """Inputs of `shipid.hybrid.features.observer_inputs`."""
-        now, seen = self.now, self.seen
-        table = {f"observer-force.{motion}": seen[name] for motion, name in zip(MOTIONS, "XYN", strict=True)}
-        current = turn_vectors(column_of_entries(seen, ("current_north", "current_east")), -now["psi"])
-        table |= split_by_name(("observer-current.u", "observer-current.v"), current)
-        return table | {f"observer-wave.{name}": now[name] - seen[name] for name in MOTIONS}
-
-
-def feature_expressions(now: NamedExpressions, commands: Sequence[str]) -> dict[str, MX]:
-    """u, v, r, commands, relative wind and other environment, as `shipid.hybrid.features.feature_table`."""
-    table = {name: now[name] for name in (*MOTIONS, *commands)}
-    if "V_w" in now and "beta_w" in now:
-        angle = now["beta_w"] - now["psi"]
-        table["u_rw"] = now["u"] - now["V_w"] * ca.cos(angle)
-        table["v_rw"] = now["v"] - now["V_w"] * ca.sin(angle)
-    return table | {name: now[name] for name in direct_inputs(now)}
+            return MX(0)
+        return ca.logic_not(self.physics.is_slow(self.physics.records(self.instants)))
 
 
 def _row_lengths(places: MX) -> MX:

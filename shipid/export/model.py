@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import MX
 
 from shipid.errors import ShipidError
-from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_alarm_raised, is_band_promised
-from shipid.export.correctors import CORRECTORS
+from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_band_promised
+from shipid.export.correctors import symbolic_corrector
 from shipid.export.equations import function_by_names, symbols_of
-from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs
+from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs, SymbolicPhysics
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.method import widen_range
-from shipid.hybrid.methods import METHODS
+from shipid.hybrid.novelty import alarm_inputs
 from shipid.hybrid.physics import Physics
 from shipid.observer import ESTIMATE_COLUMNS
 from shipid.physics.signals import signal_of, signal_row
@@ -51,15 +52,16 @@ class ExportModel:
         `shipid.export.band.BAND_ROWS`; where `promised` is 0 it is not a number. The choice of a band and the last two
         outputs are there where the predictor has bands; a band has no derivative.
 
-        ShipidError for a method that has no counterpart, whose parts do not fit together, or are too large.
+        `predict` of the method itself runs on symbols. ShipidError for a mean, for networks of PyTorch, for a method
+        whose parts do not fit together or are too large, or that CasADi cannot follow.
         """
         corrector, bands = self.predictor.corrector, self.predictor.bands
         if isinstance(corrector, MeanCorrector):
             raise ShipidError("a mean over foundations cannot be exported: export the cells of its foundations")
-        if type(corrector) not in CORRECTORS:
-            kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
+        if hasattr(corrector, "trace_onnx"):
             raise ShipidError(
-                f"a predictor by the method {self.predictor.method} cannot be exported; these can: {', '.join(kinds)}"
+                f"a predictor by the method {self.predictor.method} cannot be exported so: its networks are of "
+                "PyTorch, export them to onnx"
             )
         tables = [part.arrays() for part in (corrector, bands, self.predictor.alarm) if part is not None]
         arrays = [array for table in tables for array in table.values()]
@@ -70,11 +72,24 @@ class ExportModel:
                 "use fewer trees or units, larger leaves, or the method path-drawn"
             )
         known = PredictorInputs(self.physics, self.layout)
+        physics, method = SymbolicPhysics(**vars(self.predictor.physics)), self.predictor.method
         try:
-            path = CORRECTORS[type(corrector)](known, corrector)
-        except (LookupError, ValueError, TypeError, AttributeError, RuntimeError, AssertionError) as error:
+            predicted: Any = symbolic_corrector(corrector).predict(
+                physics, known.instants, physics.paths(known.instants)
+            )
+            path = MX(predicted.reshape(physics.horizon, 2)).T
+        except (
+            ShipidError,
+            ArithmeticError,
+            LookupError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            RuntimeError,
+        ) as error:
             raise ShipidError(
-                f"the parts of the method {self.predictor.method!r} do not fit together ({error}): its file is damaged"
+                f"the parts of the method {method!r} do not fit together ({error}): its file is damaged, or `predict` "
+                "takes what CasADi does not have of NumPy"
             ) from error
         inputs, outputs = (
             dict(known.inputs),
@@ -83,7 +98,9 @@ class ExportModel:
         if bands is not None:
             choice = symbols_of(dict.fromkeys(BAND_CHOICE, 1))
             promised = is_band_promised(bands, **choice)
-            rows = band_rows(bands, known.now, path, self.physics.step, half_axes_at(bands, **choice), known.past)
+            rows = band_rows(
+                bands, known.now, path, self.physics.step, half_axes_at(bands, **choice), known.instants.past
+            )
             inputs |= choice
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
         return function_by_names("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
@@ -91,7 +108,8 @@ class ExportModel:
     def _outside(self, known: PredictorInputs) -> MX:
         """Whether the alarm is raised: the calibrated one, or else by the limits."""
         if self.predictor.alarm is not None:
-            return is_alarm_raised(self.predictor.alarm, known)
+            alarm = self.predictor.alarm
+            return MX(alarm.is_raised(alarm_inputs(alarm.inputs, alarm.past, known.physics, known.instants)))
         inside = MX(1 if self.limits else 0)
         for name, (low, high) in self.limits.items():
             inside = ca.logic_and(inside, ca.logic_and(known.now[name] >= low, known.now[name] <= high))

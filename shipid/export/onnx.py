@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import ShipidError
-from shipid.export.correctors import networks_of
 from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator, Layers, Normaliser
+from shipid.hybrid.method import Array
 from shipid.hybrid.one_step import OneStepCorrector
+from shipid.hybrid.units import Units
 from shipid.version import __version__
 
 OPSET = 17  # the newest of ONNX 1.12, which all runtimes of the last years have
@@ -77,11 +78,23 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     return file
 
 
+def layers_of_units(units: Units, even: Array, odd: Array) -> Layers:
+    """Two layers that give `Units.parts` times weights: `even` (M + 1, p), `odd` (M or M + 1, q)."""
+    size = max(len(units.offset), 1) ** 0.5
+    if units.reflection is None:
+        weight = np.concatenate([even, odd], axis=1)
+        return (units.weight, units.offset), (weight[1:] / size, weight[0])
+    inner = np.concatenate([units.weight, units.reflection @ units.weight], axis=1)
+    outer = np.block([[even[1:], odd], [even[1:], -odd]]) / (2 * size)
+    return (inner, np.tile(units.offset, 2)), (outer, np.r_[even[0], np.zeros(odd.shape[1])])
+
+
 def _networks_to_write(model: ExportModel) -> tuple[list[tuple[Normaliser, Layers]], str, list[int]]:
     """The networks with outputs that are what they add, its name, and its shape for an instant."""
     corrector, horizon = model.predictor.corrector, model.layout.horizon
     if isinstance(corrector, OneStepCorrector):
-        return networks_of(corrector), "acceleration", [3]
+        heads = [(head.units, head.surge, head.sway_yaw) for head in corrector.heads]
+        return [(parts[0].normaliser, layers_of_units(*parts)) for parts in heads], "acceleration", [3]
     if not isinstance(corrector, Compensator):
         raise ShipidError(
             f"the method {model.predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "

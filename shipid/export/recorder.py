@@ -9,7 +9,13 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.export.equations import Equations, function_by_names, split_by_name, symbols_of
+from shipid.export.equations import (
+    Equations,
+    function_by_names,
+    memory_advance,
+    split_by_name,
+    symbols_of,
+)
 from shipid.export.known import POSITION_ENTRIES, column_of_entries, turn_vectors
 from shipid.export.model import ExportModel
 from shipid.observer import (
@@ -88,7 +94,7 @@ def keep_function(model: ExportModel) -> ca.Function:
     if model.physics.vessel is not None and names.reached:
         equations = Equations(model.physics.vessel)
         orders = column_of_entries(last, equations.model.commands)
-        reached = equations.advance(reached, orders, equations.values, dt)
+        reached = memory_advance(equations.model)(reached, orders, equations.values, dt)
     results = {"kept": kept, "moved": ca.if_else(anew, 0, shift)}
     results["after"] = ca.if_else(anew, column_of_entries(row, names.reached), reached)
     return function_by_names("keep", symbols, results)

@@ -70,7 +70,8 @@ class FastMotion(StoredData):
     def growth(self, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Array:
         """How much wider (S,) a band is, 1 or more."""
         power = fast_power(columns, past, self.past) * self.weights
-        return np.asarray(np.sqrt(np.maximum(power.max(axis=1), 1.0)))
+        size: Array = np.sqrt(np.maximum(power.max(axis=1), 1.0))
+        return size
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,15 +148,17 @@ class Bands(StoredData):
         self, paths: Array, columns: Mapping[str, Array], step: float, past: Mapping[str, Array] | None = None
     ) -> Array:
         """How much wider (S,) the band of each prediction is than that of an average one [1]."""
-        points = np.stack([columns[name] for name in self.names], axis=1)
-        away = nearest_distances(points / self.spread, self.centres / self.spread)
+        away = self.away(np.stack([columns[name] for name in self.names], axis=1))
         seen = np.clip(
             prediction_traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high
         )
         fast = 1.0 if self.fast is None else self.fast.growth(columns, past or {})
-        return np.asarray(
-            np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0) * fast
-        )
+        size: Array = np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
+        return size * fast
+
+    def away(self, points: Array) -> Array:
+        """Distance (S,) of points (S, d) from the windows of training."""
+        return nearest_distances(points / self.spread, self.centres / self.spread)
 
     def check(self, level: float, kind: str | None = None) -> None:
         """Raise DataError, one sentence, where no band of this level can be promised."""
@@ -192,11 +195,14 @@ def radius_at_level(table: Array, level: float) -> Array:
 
 def track_directions(paths: Array) -> Array:
     """Unit vectors (T, S, 2) along paths (T, S, 2) that start at the origin; ahead where a path does not move."""
-    first = np.concatenate([np.zeros_like(paths[:1]), paths[:-1]])
-    chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
-    size = vector_lengths(chords)
-    moves = size > 1e-12 * np.max(size, axis=0, initial=0.0)
-    return np.asarray(np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0]))
+    flat = paths.reshape(len(paths), -1)
+    first = np.concatenate([np.zeros_like(flat[:1]), flat[:-1]])
+    chords = np.concatenate([flat[1:] - first[:-1], flat[-1:] - first[-1:]])
+    x, y = chords[:, ::2], chords[:, 1::2]
+    size = np.hypot(x, y)
+    moves = size > 1e-12 * size.max(axis=0)
+    length = np.where(moves, size, 1.0)
+    return np.stack([np.where(moves, x / length, 1.0), np.where(moves, y / length, 0.0)], axis=-1)
 
 
 def split_along_track(errors: Array, ahead: Array) -> tuple[Array, Array]:
@@ -217,15 +223,17 @@ def fast_filters(rows: int) -> Array:
 
 def fast_power(columns: Mapping[str, Array], past: Mapping[str, Array], rows: int) -> Array:
     """Mean squares (S, 6) of u, v, r over the last rows and the instant, each through both `fast_filters`."""
-    series = np.stack([np.concatenate([past[name][-rows:], columns[name][None]]) for name in MOTIONS])  # (3, N, S)
-    passed = np.einsum("fij,mjs->mfis", fast_filters(rows + 1), series, optimize=True)
-    return np.asarray(np.square(passed).mean(axis=2).reshape(6, -1).T)
+    series = [np.concatenate([past[name][-rows:], np.stack([columns[name]])]) for name in MOTIONS]  # (N, S) each
+    filters = fast_filters(rows + 1)
+    return np.stack([np.square(one @ values).mean(axis=0) for values in series for one in filters], axis=1)
 
 
-def path_chords(paths: Array) -> Array:
-    """Three chords (3, S, 2) [m] of paths (T, S, 2) [m] that start at the origin, one for each third of the steps."""
-    ends = np.array([-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)])
-    return np.diff(np.concatenate([np.zeros_like(paths[:1]), paths[ends]]), axis=0)
+def path_chords(paths: Array) -> tuple[Array, Array]:
+    """Three chords of paths (T, S, 2) [m] that start at the origin, one for each third of the steps: x, y (3, S)."""
+    flat = paths.reshape(len(paths), -1)
+    ends = [-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)]
+    chords = np.diff(np.concatenate([np.zeros_like(flat[:1]), flat[ends]]), axis=0)
+    return chords[:, ::2], chords[:, 1::2]
 
 
 def prediction_traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array, length: float) -> Array:
@@ -236,16 +244,14 @@ def prediction_traits(paths: Array, columns: Mapping[str, Array], step: float, a
     turns later [rad]. slip : how far the turn is from what the present yaw rate would give [rad].
     distance : logarithm of 1 + the distance from the windows of training.
     """
-    chords = path_chords(paths)
-    size = vector_lengths(chords)
-    cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
-    dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
-    angles = np.arctan2(cross, dot)
+    x, y = path_chords(paths)
+    dot = x[:-1] * x[1:] + y[:-1] * y[1:]
+    angles = np.arctan2(x[:-1] * y[1:] - y[:-1] * x[1:], np.where(dot == 0, 0.0, dot))  # a ship at rest does not turn
     first, second = angles
     held = columns["r"] * step * len(paths) * 2 / 3
     return np.column_stack(
         [
-            np.log(size.sum(axis=0) / length + 0.02),
+            np.log(np.hypot(x, y).sum(axis=0) / length + 0.02),
             np.abs(first + second),
             np.abs(second - first),
             np.minimum(np.abs(first + second - held), np.pi),

@@ -95,7 +95,7 @@ def calibrate_bands(
     columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r", *before}}
     centres, spread, away = _training_distances(runs, np.stack([columns[name] for name in names], axis=1))
     far = max(float(away.max()), 1e-9)
-    length = max(float(vector_lengths(path_chords(paths)).sum(axis=0) @ runs.weight), 1e-9)
+    length = max(float(np.hypot(*path_chords(paths)).sum(axis=0) @ runs.weight), 1e-9)
     seen = prediction_traits(paths, columns, step, away, length)
     middle = runs.weight @ seen
     deviation = np.sqrt(runs.weight @ (seen - middle) ** 2)

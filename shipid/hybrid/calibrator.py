@@ -38,8 +38,7 @@ class TrajectoryInputs(Inputs):
         if physics.vessel is None:
             return inputs
         states = physics.states(instants)
-        with np.errstate(invalid="ignore"):
-            sound = np.isfinite(np.stack([states[name] for name in TRAJECTORY_SIGNALS])).all(axis=(0, 1))
+        sound = (np.abs(np.concatenate([states[name] for name in TRAJECTORY_SIGNALS])) < np.inf).all(axis=0)
         for k in np.unique(np.round(np.linspace(0, physics.horizon, self.moments + 1)[1:]).astype(int)):
             label = f"physics-{k * physics.step:g}"
             inputs |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in TRAJECTORY_SIGNALS}

@@ -57,7 +57,7 @@ class Network(StoredData):
         units = self.normaliser.apply(table)
         for inner, offset in hidden:
             units = np.tanh(units @ inner + offset)
-        return np.tensordot(self.basis, unflatten_paths(units @ weight + bias), 1)
+        return weigh_shapes(self.basis, units @ weight + bias)
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,12 @@ class Compensator(PathCorrector):
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
-        total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
-        return np.asarray(total / len(self.networks))
+        return mean_paths([network.predict(table) for network in self.networks])
+
+
+def mean_paths(paths: Sequence[Array]) -> Array:
+    """The mean of paths (T, S, 2); IndexError where there is none."""
+    return sum(paths[1:], start=paths[0]) / len(paths)
 
 
 def flatten_paths(paths: Array) -> Array:
@@ -104,6 +108,12 @@ def flatten_paths(paths: Array) -> Array:
 def unflatten_paths(outputs: Array) -> Array:
     """Arrange paths or shapes (r, S, 2) of outputs (S, 2 r): the inverse of `flatten_paths`."""
     return np.stack(np.split(outputs.T, 2), axis=-1)
+
+
+def weigh_shapes(basis: Array, outputs: Array) -> Array:
+    """Paths (T, S, 2) [m] that outputs (S, 2 r), x_1 ... x_r, y_1 ... y_r, weigh shapes (T, r) to."""
+    weights = unflatten_paths(outputs).reshape(basis.shape[1], -1)
+    return (basis @ weights).reshape(len(basis), -1, 2)
 
 
 def smooth_basis(horizon: int, terms: int) -> Array:

@@ -47,12 +47,12 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
     for name in (*MOTIONS, *commands):
         if name not in columns:
             raise DataError(f"the compensator needs this column; there are {', '.join(sorted(columns))}", path=name)
-    table = {name: np.asarray(columns[name], dtype=float) for name in (*MOTIONS, *commands)}
+    table = {name: columns[name] for name in (*MOTIONS, *commands)}
     if "V_w" in columns and "beta_w" in columns:
-        angle = np.asarray(columns["beta_w"]) - np.asarray(columns["psi"])
-        table["u_rw"] = table["u"] - np.asarray(columns["V_w"]) * np.cos(angle)
-        table["v_rw"] = table["v"] - np.asarray(columns["V_w"]) * np.sin(angle)
-    return table | {name: np.asarray(columns[name], dtype=float) for name in direct_inputs(columns)}
+        angle = columns["beta_w"] - columns["psi"]
+        table["u_rw"] = table["u"] - columns["V_w"] * np.cos(angle)
+        table["v_rw"] = table["v"] - columns["V_w"] * np.sin(angle)
+    return table | {name: columns[name] for name in direct_inputs(columns)}
 
 
 def select_inputs(table: Mapping[str, Array], names: Sequence[str]) -> Array:
@@ -165,7 +165,8 @@ def value_before(instants: Instants, name: str, seconds: float, step: float) -> 
     steps, held = count_steps(seconds, step), len(instants.past.get(name, ()))
     if held < steps:
         raise DataError(f"the method needs {seconds:g} s of the past, there are {held * step:g} s", path=name)
-    return np.asarray(instants.past[name][-steps])
+    values: Array = instants.past[name][-steps]
+    return values
 
 
 def input_group(name: str) -> str:
@@ -220,7 +221,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     dx, dy = x0 - ends["x"], y0 - ends["y"]
     c, s = np.cos(turned), np.sin(turned)
     errors = {"x": c * dx + s * dy, "y": c * dy - s * dx, **{name: columns[name] - ends[name] for name in MOTIONS}}
-    sound = np.isfinite(np.stack(list(errors.values()))).all(axis=0)
+    sound = (np.abs(np.stack([*errors.values()])) < np.inf).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveInt
 
 from shipid.errors import ShipidError
-from shipid.hybrid.compensator import PathCorrector, flatten_paths, unflatten_paths
+from shipid.hybrid.compensator import PathCorrector, flatten_paths, weigh_shapes
 from shipid.hybrid.features import Memory, select_inputs
 from shipid.hybrid.method import Array, Index
 from shipid.hybrid.search import LearningProblem, PathProblem, Point, SearchedAlone, seed_of
@@ -90,8 +90,7 @@ class ForestCorrector(PathCorrector):
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
-        weights = self.trees.predict(select_inputs(table, self.names))
-        return np.tensordot(self.basis, unflatten_paths(weights), 1)
+        return weigh_shapes(self.basis, self.trees.predict(select_inputs(table, self.names)))
 
 
 class ForestProblem(PathProblem, LearningProblem):

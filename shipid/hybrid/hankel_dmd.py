@@ -22,11 +22,17 @@ from shipid.hybrid.features import MOTIONS, count_steps, feature_table
 from shipid.hybrid.method import Array, Index
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale
-from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths, true_motion
+from shipid.hybrid.stepping import (
+    MISSED_NAMES,
+    StepMethod,
+    Stepper,
+    StepProblem,
+    step_alone,
+    stepped_paths,
+    true_motion,
+)
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs, apply_blocks, solve_ridges
-
-MISSED_NAMES = ("missed.u", "missed.v", "missed.r")
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple
         return rows
     given = {name: values for name, values in past.items() if "." in name}
     then = Instants({name: values[0] for name, values in past.items()}, planned=given)
-    motion = {name: np.concatenate([past[name], instants.columns[name][None]]) for name in (*MOTIONS, "psi")}
+    motion = {name: np.concatenate([past[name], np.stack([instants.columns[name]])]) for name in (*MOTIONS, "psi")}
     return rows | missed_steps(replace(physics, horizon=delays), then, motion)
 
 
@@ -102,16 +108,11 @@ class HankelCorrector(StoredData):
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11)."""
         law = self.law
-        rows = past_rows(physics, instants, law.delays, law.commands)
 
-        def acceleration(at: Instants, _: int, __: Array) -> Array:
-            residual = law(delayed_inputs(at.columns, rows, law.delays, law.commands))
-            now = {**at.columns, **dict(zip(MISSED_NAMES, residual.T, strict=True))}
-            for name, values in rows.items():  # what held at the start of the step becomes the past
-                rows[name] = np.concatenate([values[1:], now[name][None]])
-            return residual
+        def acceleration(at: Instants, _: Array) -> Array:
+            return law(delayed_inputs(at.columns, at.past, law.delays, law.commands))
 
-        return stepped_paths(physics, instants, acceleration)
+        return stepped_paths(physics, instants, acceleration, past_rows(physics, instants, law.delays, law.commands))
 
 
 class HankelProblem(StepProblem):

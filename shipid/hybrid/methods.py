@@ -9,12 +9,11 @@ from shipid.document import parse_model
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.calibrator import Calibrator
-from shipid.hybrid.contract import fault_of_method
 from shipid.hybrid.forest import Forest
 from shipid.hybrid.hankel_dmd import HankelDMD
 from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.learned_force import LearnedForce
-from shipid.hybrid.method import Method
+from shipid.hybrid.method import Method, fault_of_method
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn

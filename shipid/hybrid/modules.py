@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -59,8 +60,8 @@ def physics_without_modules(physics: Physics) -> list[Physics]:
 
 def module_accelerations(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
     """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as of `step_alone`."""
-    after = np.stack([whole, *(step_alone(one, at) for one in reduced)], axis=1)
-    return (after[:, :-1] - after[:, 1:]) / step
+    afters = [whole, *(step_alone(one, at) for one in reduced)]
+    return np.stack([before - after for before, after in pairwise(afters)], axis=1) / step
 
 
 @dataclass(frozen=True)
@@ -94,8 +95,12 @@ class Alarm(StoredData):
     def weight(self, table: Mapping[str, Array], fade: float) -> Array:
         """1 within the radius of a centre, falling to 0 at `fade` (in standard deviations) beyond it, (S,)."""
         z = self.normaliser.apply(table)
-        weights = np.clip(1 - (_distance_to_centres(z, self.centres) - self.radius) / fade, 0.0, 1.0)
-        return np.where(np.isfinite(weights), weights, 0.0)
+        weights = np.clip(1 - (self.away(z) - self.radius) / fade, 0.0, 1.0)
+        return np.where(np.abs(weights) < np.inf, weights, 0.0)
+
+    def away(self, z: Array) -> Array:
+        """Distance (S,) of normalised inputs (S, d) to the nearest centre."""
+        return _distance_to_centres(z, self.centres)
 
 
 def _distance_to_centres(z: Array, centres: Array) -> Array:
@@ -128,9 +133,10 @@ class ModulesCorrector(StoredData):
             raise ResultError(f"the physics has other modules than {', '.join(self.modules)}", path="modules")
         reduced = physics_without_modules(physics)
 
-        def acceleration(at: Instants, _: int, whole: Array) -> Array:
-            extra = self.factors(at) - 1
-            return np.asarray(np.einsum("sk,skj->sj", extra, module_accelerations(reduced, at, whole, physics.step)))
+        def acceleration(at: Instants, whole: Array) -> Array:
+            extra = (self.factors(at) - 1).reshape(-1, len(reduced), 1)
+            added: Array = (extra * module_accelerations(reduced, at, whole, physics.step)).sum(axis=1)
+            return added
 
         return stepped_paths(physics, instants, acceleration)
 
@@ -139,7 +145,8 @@ class ModulesCorrector(StoredData):
         table = feature_table(at.columns, self.commands)
         even, _ = self.units.parts(table)
         raw = apply_blocks(even, self.weights.swapaxes(-1, -2))
-        return np.asarray(1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit))
+        weight = self.alarm.weight(table, self.fade).reshape(-1, 1)
+        return 1 + weight * np.clip(raw, -self.limit, self.limit)
 
 
 class ModulesProblem(StepProblem):

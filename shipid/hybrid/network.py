@@ -64,7 +64,7 @@ class TrainedModule(GatedNetwork):
 
     def _outputs(self, seen: Sequences) -> Array:
         with torch.no_grad():
-            return np.asarray(self.module()(*map(torch.from_numpy, seen)).numpy())
+            return np.asarray(self.module()(*map(torch.from_numpy, map(np.asarray, seen))).numpy())
 
 
 class MeasuredNetworks(torch.nn.Module):

@@ -50,9 +50,11 @@ class NoveltyAlarm(StoredData):
 
     def is_raised(self, table: Mapping[str, Array]) -> NDArray[np.bool_]:
         """Whether the alarm is raised (S,), also where an input is not a number."""
-        away = np.linalg.norm((select_inputs(table, self.names) - self.middle) @ self.root, axis=1)
+        away = np.square((select_inputs(table, self.names) - self.middle) @ self.root).sum(axis=1)
         beyond = range_excess(select_inputs(table, self.limited), self.low, self.high, self.high - self.low)
-        return np.asarray(~((away <= self.farthest) & (beyond <= self.slack)))
+        inside = np.logical_and(np.sqrt(away) <= self.farthest, (beyond <= self.slack).all(axis=1))
+        raised: NDArray[np.bool_] = np.logical_not(inside)
+        return raised
 
 
 def range_of_orders(name: str) -> str:
@@ -65,9 +67,10 @@ def alarm_inputs(inputs: Inputs, past: int, physics: Physics, instants: Instants
     """Inputs (S,) of an alarm: those of a method, and the range of each order over the last rows of the past."""
     table = inputs.table(physics, instants)
     for name in inputs.commands:
-        now = np.asarray(instants.columns[name])[None]
-        before = np.asarray(instants.past[name])[-past:] if past else now
-        table[range_of_orders(name)] = np.ptp(np.concatenate([before, now]), axis=0)
+        now = np.stack([instants.columns[name]])
+        series = np.concatenate([instants.past[name][-past:], now]) if past else now
+        known = (np.abs(series) < np.inf).all(axis=0)
+        table[range_of_orders(name)] = np.where(known, np.ptp(series, axis=0), np.nan)
     return table
 
 
@@ -77,10 +80,10 @@ def range_rounding(low: Array, high: Array) -> Array:
 
 
 def range_excess(values: Array, low: Array, high: Array, width: Array) -> Array:
-    """How far values (S, k) lie outside their ranges, (S,): the greatest excess over the width."""
+    """How far values (S, k) lie outside their ranges, over the width; below 0 inside."""
     rounding = range_rounding(low, high)
-    beyond = np.maximum(low - values, values - high) - rounding
-    return np.asarray(np.maximum(beyond / np.maximum(width, rounding), 0.0).max(axis=1, initial=0.0))
+    beyond: Array = (np.maximum(low - values, values - high) - rounding) / np.maximum(width, rounding)
+    return beyond
 
 
 def calibrate_alarm(
@@ -110,7 +113,7 @@ def calibrate_alarm(
         middle, root = _middle_and_root((total - moments[one]) / (runs.count - 1), runs.count)
         away[mine] = np.linalg.norm((values[mine] - middle) @ root, axis=1)
         ends = np.delete(lows, one, axis=0).min(axis=0), np.delete(highs, one, axis=0).max(axis=0)
-        beyond[mine] = range_excess(bounded[mine], *ends, width)
+        beyond[mine] = range_excess(bounded[mine], *ends, width).max(axis=1, initial=0.0)
     middle, root = _middle_and_root(total / runs.count, runs.count)
     farthest, slack = (float(radius_at_level(band_radii(score, runs), ALARM_LEVEL)) for score in (away, beyond))
     return NoveltyAlarm(inputs, past, names, middle * scale, root / scale[:, None], farthest, limited, low, high, slack)

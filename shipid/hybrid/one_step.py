@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
+from shipid.hybrid.compensator import mean_paths
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
@@ -52,9 +53,9 @@ class OneStepCorrector(StoredData):
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11), rolled out with the missing acceleration."""
 
-        def acceleration(at: Instants, _: int, __: Array) -> Array:
+        def acceleration(at: Instants, _: Array) -> Array:
             table = feature_table(at.columns, self.commands)
-            return np.asarray(np.mean([head.acceleration(table) for head in self.heads], axis=0))
+            return mean_paths([head.acceleration(table) for head in self.heads])
 
         return stepped_paths(physics, instants, acceleration)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
@@ -91,7 +91,7 @@ class Physics:
         if self.vessel is None:
             return np.zeros((self.horizon, 1, len(instants), 2)), np.zeros((1, len(instants)), bool)
         result, (north, east), lost = self._rollout(instants, ("north", "east"), parameters, device)
-        paths = np.stack(_positions_in_frame(instants, north, east), axis=-1)
+        paths = np.stack(positions_in_frame(instants, north, east), axis=-1)
         begun = self.step * np.stack([instants.columns.get(name, 0 * lost) for name in ("u", "v")], axis=-1)
         bad, limit = result.diverged, SPEED_LIMIT * self.step
         paths[:, bad] = hold_velocity(paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad], limit)
@@ -106,7 +106,7 @@ class Physics:
         kept = ("north", "east", *MOTION, *leaning)
         result, (north, east), lost = self._rollout(instants, kept, None, "cpu", engine)
         lost = np.where(result.diverged[0], np.nan, lost)
-        x, y = _positions_in_frame(instants, north[:, 0] + lost, east[:, 0] + lost)
+        x, y = positions_in_frame(instants, north[:, 0] + lost, east[:, 0] + lost)
         motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
         if leaning:
             with np.errstate(all="ignore"):  # a path that diverged
@@ -121,6 +121,10 @@ class Physics:
         kept = ("north", "east", *(f"{ACTUAL}{name}" for name in names))
         result, *_ = self._rollout(instants, kept, None, "cpu")
         return {name: result[f"{ACTUAL}{name}"][:, 0] for name in names}
+
+    def call_once(self, function: Callable[..., dict[str, Array]]) -> Callable[..., dict[str, Array]]:
+        """Return a function of instants and arrays as it is; physics on symbols writes it once, as one of CasADi."""
+        return function
 
     def gradient(
         self, instants: Instants, future: Array, names: Sequence[str], parameters: Array | None = None
@@ -274,7 +278,7 @@ def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:
     return columns.get("north", zero), columns.get("east", zero), columns.get("psi", zero)
 
 
-def _positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
+def positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
     """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged may not be finite."""
     with np.errstate(all="ignore"):  # it is flagged, and no news to the caller
         return to_frame(north, east, *_place_of_instants(instants))

@@ -17,7 +17,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.hybrid.compensator import Normaliser, flatten_paths, unflatten_paths
+from shipid.hybrid.compensator import Normaliser, flatten_paths, mean_paths, weigh_shapes
 from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
@@ -34,8 +34,8 @@ from shipid.hybrid.search import (
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 
-Sequences = tuple[Array, Array]
-"""What a network reads, normalised: the past with the instant (P + 1, S, d), and inputs at the instant (S, e)."""
+Sequences = tuple[list[Array], Array]
+"""What a network reads, normalised: P + 1 rows (S, d), the past with the instant, and inputs at the instant (S, e)."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,12 @@ class SequenceReader(StoredData):
     def read(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Sequences:
         """Read instants, with their inputs (S,) as `Inputs.table` gives them."""
         rows = [self.past.apply(signals) for signals in past_signals(instants, self.steps, commands)]
-        return np.stack(rows), self.now.apply(table)
+        return rows, self.now.apply(table)
 
     def mirrored(self, seen: Sequences) -> Sequences:
         """The image of port and starboard."""
         assert self.mirrors is not None
-        return seen[0] @ self.mirrors[0], seen[1] @ self.mirrors[1]
+        return [row @ self.mirrors[0] for row in seen[0]], seen[1] @ self.mirrors[1]
 
 
 def past_signals(instants: Instants, steps: int, commands: tuple[str, ...]) -> list[dict[str, Array]]:
@@ -86,7 +86,7 @@ class GatedNetwork(StoredData):
         if self.reader.mirrors is not None:
             half = np.repeat([1.0, -1.0], outputs.shape[1] // 2)
             outputs = (outputs + half * self._outputs(self.reader.mirrored(seen))) / 2
-        return np.tensordot(self.basis, unflatten_paths(outputs), 1)
+        return weigh_shapes(self.basis, outputs)
 
     def _outputs(self, seen: Sequences) -> Array:
         layers, (past, now) = self.layers, seen
@@ -99,7 +99,7 @@ class GatedNetwork(StoredData):
             gate = _logistic(update + update_h)
             hidden = (1 - gate) * np.tanh(fresh + _logistic(reset + reset_h) * fresh_h) + gate * hidden
         full = np.concatenate([hidden, now], axis=1)
-        return np.asarray(np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"])
+        return np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
 
 
 def _logistic(values: Array) -> Array:
@@ -119,7 +119,7 @@ class RecurrentCorrector(StoredData):
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         table = self.inputs.table(physics, instants)
         corrections = [network.predict(table, instants, self.inputs.commands) for network in self.networks]
-        return np.asarray(paths + np.mean(corrections, axis=0))
+        return paths + mean_paths(corrections)
 
 
 class RecurrentProblem(PathProblem):

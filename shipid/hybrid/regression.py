@@ -33,8 +33,8 @@ LEARNED, OF_CURRENT = 100, 30  # windows at most, one after the other, that give
 MIRROR = np.array([1.0, -1.0, -1.0])
 
 
-def law_terms(table: Mapping[str, Any], names: Sequence[str], maths: Any = np) -> list[Any]:
-    """Terms (S,) of the law, of which the first is 1; of symbols where `maths` is CasADi.
+def law_terms(table: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
+    """Terms (S,) of the law, of which the first is 1.
 
     table : u, v, r through the water and every other input. names : inputs that vary; orders have a dot.
     """
@@ -46,12 +46,12 @@ def law_terms(table: Mapping[str, Any], names: Sequence[str], maths: Any = np) -
         terms += values + [a * b for a, b in combinations_with_replacement(values, 2)]
         terms += [a * abs(b) for a, b in product(values, values)]
     for name in orders:
-        value = maths.sin(table[name]) if is_steering(name) else table[name]
+        value = np.sin(table[name]) if is_steering(name) else table[name]
         terms += [value, value * u, value * (abs(u) * u if is_steering(name) else abs(value))]
         if is_steering(name):
             mine = [one for one in thrusts if one.partition(".")[0] == name.partition(".")[0]]
             pulls = [table[one] * abs(table[one]) for one in mine or thrusts]
-            terms += [pull * side for pull in pulls for side in (value, maths.cos(table[name]))]
+            terms += [pull * side for pull in pulls for side in (value, np.cos(table[name]))]
     return terms
 
 
@@ -88,13 +88,13 @@ class RegressionCorrector(StoredData):
         """Return paths (T, S, 2) [m] in the frame (11)."""
         current, step = np.repeat(self.current, len(instants) // len(self.current), axis=0), physics.step
 
-        def acceleration(at: Instants, _: int, alone: Array) -> Array:
+        def acceleration(at: Instants, alone: Array) -> Array:
             psi, table = at.columns["psi"], feature_table(at.columns, self.commands)
             water = water_velocity(current, psi)
             more = apply_blocks(np.stack(law_terms(through_water(table, water), self.names), axis=1), self.weights)
             after = np.clip(alone - water + step * more, self.low, self.high)
             later = psi + step / 2 * (table["r"] + after[:, 2])
-            return np.asarray((after + water_velocity(current, later) - alone) / step)
+            return (after + water_velocity(current, later) - alone) / step
 
         return stepped_paths(physics, instants, acceleration)
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,6 @@ RIDGES = 9  # of a range
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
 SPARE_TRIALS = 4  # further trials whose errors without each run are kept
-LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
 
 
 def tune_ridge(task: Task, method: Any) -> dict[str, FitResult]:
@@ -534,45 +533,17 @@ def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tup
 
 
 class _FewRows:
-    """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b).
-
-    In single precision, which is twice as fast, where that is sound.
-    """
+    """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b)."""
 
     def __init__(self, part: _Coordinates, block: _FoldBlock) -> None:
-        self.part, self.block, self.shape = part, block, block.out.shape
-        out = block.out.flatten()
-        self.exact = part.rotated(out)
-        self.flat, self.targets = self.exact.float(), part.targets[out].float()
-        self.rows = self.flat.view(*self.shape, -1)
-        self.columns = self.rows.mT.contiguous()
-        self.unit = torch.eye(self.shape[1])
+        self.part, self.rows, self.targets = part, part.rotated(block.out), part.targets[block.out]
+        self.unit = torch.eye(block.out.shape[1], dtype=torch.float64)
 
     def without(self, ridge: float, columns: list[int] | slice) -> Tensor:
-        """What a fit without each block misses of some columns of the targets; by Cholesky's factors of I - H_bb.
-
-        In double precision for blocks with a squared pivot below `LEAST_PIVOT`, which limits the digits.
-        """
-        fitted = matrix_product(self.flat, self.part.weights(ridge, columns).float())
-        missed = torch.sub(self.targets[:, columns], fitted, out=fitted).view(*self.shape, -1)
-        diagonal = self.part.eigenvalues + ridge
-        hat = matrix_product(self.rows, self.columns * (1 / diagonal).float()[:, None])
-        lower, failed = torch.linalg.cholesky_ex(torch.sub(self.unit, hat, out=hat))
-        unsound = failed.bool() | (lower.diagonal(dim1=1, dim2=2).amin(dim=1) ** 2 < LEAST_PIVOT)
-        lower[unsound] = self.unit
-        errors = matrix_product(torch.cholesky_inverse(lower), missed)
-        if unsound.any():
-            errors = errors.double()
-            errors[unsound] = self._double(unsound, diagonal, columns)
-        return errors
-
-    def _double(self, folds: Tensor, diagonal: Tensor, columns: list[int] | slice) -> Tensor:
-        """Errors of some of the blocks without themselves, (folds, b, C), in double precision."""
-        rows = self.exact.view(*self.shape, -1)[folds]
-        weighted = rows / diagonal
-        fitted = matrix_product(weighted, self.part.product[:, columns])
-        missed = self.part.targets[:, columns][self.block.out[folds]] - fitted
-        solved: Tensor = torch.linalg.solve(self.unit.double() - matrix_product(weighted, rows.mT), missed)
+        """What a fit without each block misses of some columns of the targets; by I - H_bb."""
+        missed = self.targets[..., columns] - matrix_product(self.rows, self.part.weights(ridge, columns))
+        hat = matrix_product(self.rows / (self.part.eigenvalues + ridge), self.rows.mT)
+        solved: Tensor = torch.linalg.solve(self.unit - hat, missed)
         return solved
 
 
@@ -617,7 +588,7 @@ def _double_tensor(values: Array) -> Tensor:
 
 
 # On AMD products and functions of NumPy take a third to nine tenths of the time of those of PyTorch, except tanh with
-# AVX2 only: docs/performance.md, "Where the time goes". Both share their memory.
+# AVX2 only. Both share their memory.
 
 
 def matrix_product(left: Tensor, right: Tensor) -> Tensor:
@@ -629,12 +600,4 @@ def hidden_layer(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
     """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
     units = np.matmul(values.numpy(), weight.numpy())
     units += offset.numpy()
-    return torch.from_numpy(units).tanh_() if _tanh_by_torch() else torch.from_numpy(np.tanh(units, out=units))
-
-
-@cache
-def _tanh_by_torch() -> bool:
-    """Whether NumPy's tanh is the one for AVX2, which takes twice the time of PyTorch's; that for AVX-512 does not."""
-    functions = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")  # empty on some processors
-    used = [kind["current"] for kinds in functions.values() for kind in kinds.values()]
-    return any(name in ("X86_V3", "FMA3__AVX2") for name in used)  # as NumPy 2.4 calls AVX2, and as 2.3 does
+    return torch.from_numpy(np.tanh(units, out=units))

@@ -32,7 +32,8 @@ from shipid.hybrid.search import (
 )
 from shipid.physics.signals import measurable_signals
 
-Acceleration = Callable[[Instants, int, Array], Array]
+Acceleration = Callable[[Instants, Array], Array]
+MISSED_NAMES = ("missed.u", "missed.v", "missed.r")
 STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
 VELOCITY_LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
@@ -73,34 +74,44 @@ def _step_and_way(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     return after, np.stack([states["x"][0], states["y"][0], states["psi"][0] - at.columns["psi"]], axis=1)
 
 
-def stepped_paths(physics: Physics, instants: Instants, acceleration: Acceleration) -> Array:
+def stepped_paths(
+    physics: Physics, instants: Instants, acceleration: Acceleration, past: Mapping[str, Array] | None = None
+) -> Array:
     """Paths (T, S, 2) [m] in the frame (11) on which `acceleration` is added to each step of the physics.
 
-    acceleration : (start of the step, its number, velocities (S, 3) after it by the physics alone) -> missing
-        acceleration (S, 3) [m/s^2, rad/s^2].
+    acceleration : (start of the step, velocities (S, 3) after it by the physics alone) -> missing acceleration (S, 3)
+        [m/s^2, rad/s^2].
+    past : rows (P, S) before the first step that a start holds, of columns and `MISSED_NAMES`; they move on by a row.
     """
-    stepper, step = Stepper(physics, instants), physics.step
-    nu = np.stack([np.asarray(instants.columns[name], dtype=float) for name in MOTIONS], axis=1)
-    first = np.asarray(instants.columns["psi"], dtype=float)
-    psi, place, places = first, np.zeros((len(nu), 2)), []
+    step, stepper = physics.step, Stepper(physics, instants)
+
+    def advance(at: Instants, first: Array, place: Array) -> dict[str, Array]:
+        nu, psi = np.stack([at.columns[name] for name in MOTIONS], axis=1), at.columns["psi"]
+        alone, way = _step_and_way(physics, at)
+        more = acceleration(at, alone)
+        after = alone + step * more
+        after = np.where((np.abs(after) <= VELOCITY_LIMIT).all(axis=1).reshape(-1, 1), after, np.nan)
+        if way is None:
+            psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
+            moved = _rotate_velocity(nu, psi - first) + _rotate_velocity(after, psi_after - first)
+            place = place + step / 2 * moved
+        else:
+            way = np.where(np.abs(after) < np.inf, way + step**2 / 2 * more, np.nan)
+            psi_after = psi + way[:, 2]
+            place = place + _rotate_velocity(way, psi - first)
+        motion = {name: after[:, axis] for axis, name in enumerate(MOTIONS)}
+        missed = {name: more[:, axis] for axis, name in enumerate(MISSED_NAMES)}
+        return {**motion, "psi": psi_after, "place": place, **missed}
+
+    one, first, places, rows = physics.call_once(advance), instants.columns["psi"], [], dict(past or {})
+    now = {name: instants.columns[name] for name in (*MOTIONS, "psi")} | {"place": np.zeros((len(instants), 2))}
     with np.errstate(all="ignore"):  # a diverged path is not finite, and no news to the caller
         for k in range(physics.horizon):
-            at = stepper.at(k, {**dict(zip(MOTIONS, nu.T, strict=True)), "psi": psi})
-            alone, way = _step_and_way(physics, at)
-            more = acceleration(at, k, alone)
-            after = alone + step * more
-            after = np.where((np.abs(after) <= VELOCITY_LIMIT).all(axis=1, keepdims=True), after, np.nan)
-            if way is None:
-                psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
-                place = place + step / 2 * (
-                    _rotate_velocity(nu, psi - first) + _rotate_velocity(after, psi_after - first)
-                )
-            else:
-                way = way + step**2 / 2 * more + 0 * after  # not finite where the path has diverged
-                psi_after = psi + way[:, 2]
-                place = place + _rotate_velocity(way, psi - first)
-            nu, psi = after, psi_after
-            places.append(place)
+            at = replace(stepper.at(k, {name: now[name] for name in (*MOTIONS, "psi")}), past=rows)
+            now = one(at, first, now["place"])
+            places.append(now["place"])
+            held = {**now, **at.columns}
+            rows = {name: np.concatenate([values[1:], np.stack([held[name]])]) for name, values in rows.items()}
     return np.stack(places)
 
 

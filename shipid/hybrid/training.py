@@ -23,9 +23,9 @@ from shipid.hybrid.method import Array, Index
 
 Stack = Sequence[tuple[Tensor, Tensor]]
 Shapes = Mapping[str, tuple[int, ...]]
-Part = tuple[Sequence[tuple[Array, Array]], Array]
-"""What is read, the past (P + 1, S, d) with inputs at the instant (S, e), then its mirror image if there is one; and
-outputs (S, 2 r)."""
+Part = tuple[Sequence[tuple[list[Array], Array]], Array]
+"""What is read, P + 1 rows (S, d) of the past with inputs at the instant (S, e), then its mirror image if there is one;
+and outputs (S, 2 r)."""
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's defaults
 
@@ -349,7 +349,7 @@ def train_gated(
     """Train on the first part of the data, stop by the second; layers by name and the number of epochs."""
     generator, ((past, now), *_), outputs = torch.Generator().manual_seed(seed), *parts[0]
     shapes = {
-        "W_i": (3 * units, past.shape[2]),
+        "W_i": (3 * units, past[0].shape[1]),
         "W_h": (3 * units, units),
         "b_i": (3 * units,),
         "b_h": (3 * units,),

@@ -13,8 +13,8 @@ from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
 from shipid.hybrid.forest import ForestCorrector, Trees
-from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector, LinearLaw
-from shipid.hybrid.kernel_compensator import KernelCompensator, KernelMember
+from shipid.hybrid.hankel_dmd import HankelCorrector, LinearLaw
+from shipid.hybrid.kernel import KernelCompensator, KernelMember
 from shipid.hybrid.learned_force import HIDDEN, OUTPUT, ForceCorrector
 from shipid.hybrid.modules import Alarm, ModulesCorrector, modules_of
 from shipid.hybrid.novelty import alarm_inputs, calibrate_alarm
@@ -23,6 +23,7 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
 from shipid.hybrid.regression import RegressionCorrector, law_terms
 from shipid.hybrid.ridge import smooth_basis
+from shipid.hybrid.stepping import MISSED_NAMES
 from shipid.hybrid.units import Units
 from shipid.observer import ESTIMATE_COLUMNS, Observer
 from shipid.predictor import Predictor

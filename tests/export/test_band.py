@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -11,13 +10,13 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_alarm_raised
+from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import build_model
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.bands import Region
 from shipid.hybrid.features import NO_MEMORY, Inputs
-from shipid.hybrid.novelty import calibrate_alarm
+from shipid.hybrid.novelty import alarm_inputs, calibrate_alarm
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
@@ -177,11 +176,11 @@ def test_the_alarm_of_a_graph_is_raised_as_in_python_also_by_what_is_no_number(s
     table = {name: rng.normal(size=40) for name in ("u", "a.n", "a.range.n")} | {"calm": np.zeros(40)}
     run = np.array([f"M{i % 5}" for i in range(40)])
     alarm = calibrate_alarm(Inputs(("a.n",), NO_MEMORY), 1, table | {"a.range.n": np.abs(table["a.range.n"])}, run)
-    before, now, u, calm = (ca.MX.sym(name) for name in ("before", "now", "u", "calm"))
-    known = SimpleNamespace(
-        past=[{"a.n": before}], now={"a.n": now}, table=lambda _: {"u": u, "a.n": now, "calm": calm}
-    )
-    graph = ca.Function("alarm", [before, now, u, calm], [is_alarm_raised(alarm, known)])
+    symbols = before, now, u, calm = [ca.MX.sym(name) for name in ("before", "now", "u", "calm")]
+    columns = {name: ca.ArrayInterface.MX(one, shape=(1,)) for name, one in (("u", u), ("a.n", now), ("calm", calm))}
+    instants = Instants({**columns, "v": columns["u"], "r": columns["u"]}, {"a.n": ca.ArrayInterface(before)})
+    seen = alarm_inputs(Inputs(("a.n",), NO_MEMORY), 1, Physics(None, 1, 1.0), instants) | columns
+    graph = ca.Function("alarm", symbols, [ca.MX(alarm.is_raised(seen))])
     given = rng.normal(size=(60, 4)) * [2, 2, 2, 0]
     given[np.arange(32), np.arange(32) % 4] = np.repeat([np.nan, np.inf, 0.1, 9.0], 8)
     with np.errstate(invalid="ignore"):

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from shipid.data.windows import Instants
 from shipid.errors import ShipidError
 from shipid.export.fmu import predictor_unit, vessel_unit
 from shipid.export.model import build_model
@@ -17,9 +21,12 @@ from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.stored import StoredData
 from shipid.predictor import Predictor
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.documented import module
+from tests.export.compiled import inputs_of_model
 from tests.export.strange import drawn
 
 
@@ -117,17 +124,36 @@ def test_a_forest_beyond_the_size_is_refused(monkeypatch, tmp_path):
         export_predictor(drawn("forest", 5, vessel="mariner").predictor, "c", tmp_path / "f")
 
 
-def test_a_method_without_a_counterpart_is_named_with_those_that_have_one(simple, monkeypatch, tmp_path):
+def test_a_method_of_ones_own_is_exported_unasked(simple, monkeypatch, tmp_path):
+    """What `predict` of docs/extending.md computes by NumPy is the function that CasADi writes."""
     linear = module("A method", "linear_of_the_page", monkeypatch)
     monkeypatch.setitem(METHODS, "linear", linear.Linear)
-    normaliser = Normaliser(("u",), np.zeros(1), np.ones(1))
-    corrector = linear.LinearCorrector((), normaliser, np.zeros((3, 2, 2)), {})
-    predictor = Predictor(simple.physics, "linear", corrector, {})
-    with pytest.raises(
-        ShipidError, match=r"the method linear cannot be exported; these can: alone, .*path-drawn"
-    ) as one:
+    rng, horizon = np.random.default_rng(0), simple.physics.horizon
+    normaliser = Normaliser(("u", "r"), rng.normal(size=2), np.ones(2))
+    corrector = linear.LinearCorrector((), normaliser, rng.normal(size=(horizon, 3, 2)), {})
+    predictor = Predictor(simple.physics, "linear", corrector, simple.limits)
+    commands = vessel_dynamics(simple.physics.vessel).commands
+    instants = Instants({name: rng.uniform(0.1, 0.2, 1) for name in ("psi", "u", "v", "r", *commands)})
+    file, *_ = predictor.export("casadi", tmp_path / "own.casadi")
+    given = {name: values[0] for name, values in inputs_of_model(build_model(predictor), instants).items()}
+    path = ca.Function.load(str(file))(**given)["path"]
+    np.testing.assert_allclose(np.array(path).T, predictor.predict(instants)[:, 0], rtol=0, atol=1e-12)
+    assert np.abs(np.array(path).T - simple.predict(instants)[:, 0]).max() > 0.1
+
+
+@dataclass(frozen=True)
+class Sorted(StoredData):
+    hyperparameters: Mapping[str, float]
+    past: float = 0.0
+
+    def predict(self, physics, instants, paths):  # noqa: ARG002
+        return paths + np.sort(instants.columns["u"])[:, None]
+
+
+def test_what_casadi_cannot_follow_is_refused_in_one_line(simple, tmp_path):
+    predictor = replace(simple, corrector=Sorted({}))
+    with pytest.raises(ShipidError, match="takes what CasADi does not have of NumPy"):
         predictor.export("c", tmp_path / "out")
-    assert "linear," not in str(one.value)
 
 
 @pytest.mark.parametrize(
@@ -140,11 +166,11 @@ def test_a_method_without_a_counterpart_is_named_with_those_that_have_one(simple
             "recurrent",
             "networks.0.reader.steps",
             10**9,
-            "'recurrent' do not fit together .1000000000 steps of the past",
+            "'recurrent' do not fit together .*1000000000 steps of the past",
         ),
         ("hankel-dmd", "past", 1e18, "damaged: a past of 1?[0-9]* steps: 0 to 100000"),
         ("hankel-dmd", "past", -30.0, "damaged: a past of -[0-9]* steps: 0 to 100000"),
-        ("hankel-dmd", "law.delays", 1, "'hankel-dmd' do not fit together .'past-2.u'"),
+        ("hankel-dmd", "law.delays", 1, "'hankel-dmd' do not fit together .past-2.u"),
         ("path-drawn", "inputs.memory.history", [1e-300], "'path-drawn' do not fit together"),
     ],
 )

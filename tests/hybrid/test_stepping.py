@@ -15,7 +15,7 @@ from tests.hybrid.worlds import HORIZON, ship, world
 LAG = {"n": {"kind": "first_order", "T": 3.0, "rate": 0.5}, "alpha": {"kind": "first_order", "T": 2.0, "rate": 0.2}}
 
 
-def nothing(at, _, __):
+def nothing(at, _):
     return np.zeros((len(at), 3))
 
 
@@ -64,9 +64,9 @@ def test_steps_one_by_one_are_the_rollout(here, known, lag):
     instants = here.test.instants(known=known, hidden=hidden)
     seen = []
 
-    def spy(at, k, after):
+    def spy(at, after):
         seen.append(after)
-        return nothing(at, k, after)
+        return nothing(at, after)
 
     paths = stepped_paths(physics, instants, spy)
     states = physics.states(instants)
@@ -95,16 +95,18 @@ def test_without_physics_the_velocities_stay(here):
 def test_an_acceleration_moves_the_ship_as_it_must(here):
     instants = here.test.instants()
     still = Instants({**instants.columns, **{name: np.zeros(len(instants)) for name in "uvr"}})
-    paths = stepped_paths(Physics(None, HORIZON, 2.0), still, lambda at, _, __: np.tile([0.1, 0.0, 0.0], (len(at), 1)))
+    paths = stepped_paths(Physics(None, HORIZON, 2.0), still, lambda at, _: np.tile([0.1, 0.0, 0.0], (len(at), 1)))
     np.testing.assert_allclose(paths[-1, :, 0], 0.1 * (2 * HORIZON) ** 2 / 2)
 
 
 def test_a_path_that_diverges_is_not_finite_and_harms_no_other(here):
     instants = here.test.instants(known=True)
 
-    def wild(at, k, _):
+    steps = iter(range(HORIZON))
+
+    def wild(at, _):
         accelerations = np.zeros((len(at), 3))
-        accelerations[0] = 1e3 if k == 2 else 0.0
+        accelerations[0] = 1e3 if next(steps) == 2 else 0.0
         return accelerations
 
     paths = stepped_paths(here.physics, instants, wild)
