@@ -84,6 +84,11 @@ class Cause:
     cost: float = 0.0
     of_runs: bool = False
 
+    @property
+    def name(self) -> str:
+        """The key without the words that tell variants of a cause apart."""
+        return self.key.partition(" / ")[0]
+
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
         return tuple((np.exp(theta) if self.ratio else theta).tolist())
@@ -142,7 +147,7 @@ def _exchange(pairs: Sequence[tuple[str, str]], motion: Motion, _: Array) -> Mot
     return motion.put({a: motion.columns[b] for pair in pairs for a, b in (pair, pair[::-1])})
 
 
-def _turn_heading(motion: Motion, size: Array) -> Motion:
+def _turn_heading(motion: Motion, size: Array | Sequence[Array]) -> Motion:
     """The heading less a bias, and velocities turned with it: those over ground stay."""
     columns = motion.columns
     turned = (columns["u"] + 1j * columns["v"]) * np.exp(1j * size[0])
@@ -152,6 +157,11 @@ def _turn_heading(motion: Motion, size: Array) -> Motion:
 def _heading_from_course(motion: Motion, _: Array) -> Motion:
     columns = motion.columns
     return motion.put({"psi": columns["psi"] - np.arctan2(columns["v"], columns["u"])})
+
+
+def _heading_about_pivot(motion: Motion, ahead: Array) -> Motion:
+    """The heading of a log whose drift is lost: of a ship that turns about a point so far ahead [m]."""
+    return _turn_heading(motion, [-np.arctan2(ahead[0] * motion.columns["r"], motion.columns["u"])])
 
 
 def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
@@ -279,7 +289,12 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
             equals=equals, tells="turns to both sides",
         )  # fmt: skip
-    yield Cause("heading is course", _heading_from_course, repair="name the column of a gyro or a compass as psi")
+    gyro = "name the column of a gyro or a compass as psi"
+    yield Cause("heading is course", _heading_from_course, repair=gyro)
+    yield Cause(
+        "heading is course / and drift is lost", _heading_about_pivot, (0.05 * scales.length,), "m", repair=gyro,
+        starts=(0.4 * scales.length,), equals=("sensor v scale",),
+    )  # fmt: skip
     arms = {"position": ("lever arm velocity", "sensor position delay"), "velocity": ("lever arm position",)}
     for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
         yield Cause(

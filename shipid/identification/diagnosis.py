@@ -66,7 +66,7 @@ from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes
-from shipid.physics.signals import is_command, is_shaft, is_wrapped_angle
+from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
@@ -75,11 +75,13 @@ from shipid.vessel.load import Vessel
 Steps = NDArray[np.integer[Any]]
 NONE, UNCLEAR = "none", "cannot tell"
 LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
+CHANGES = 0.5  # share of the rows with a change: from there on a command is measured, below it is an order
+EVERY, BETWEEN = 2, 0.7  # steps from one evaluation of the physics to the next; over which an order is a mean
 MOST_PASSING = 200  # rows in which a ship of unknown length runs it, at most
-MOST_BUMPS = 400  # of a log: of a longer one parts are taken, evenly
+MOST_BUMPS = 200  # of a log: of a longer one parts are taken, evenly
 SMOOTH, NOISY = POINTS / 24, 0.03  # steps, of the smoothing before the forces; noise over signal from which it grows
 EXACT = 0.01  # of the size of the terms: what no resampled log says better
-AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
+SHORTEST, AHEAD = 40, 80  # steps of a stretch; of a predicted path, 5 ship lengths where the runs are long enough
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
@@ -89,9 +91,9 @@ HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
+BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
 DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
-WORTH = {"sensor": 0.2, "command": 0.25, "coefficient": 0.3}  # share of the error of the path; a poor vessel has some
-WORTH_OTHER, WORTH_DISCRETE = 0.2, 0.05  # of another cause; of one without a size, as a wrong sign
+WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the paths; of a cause without a size, as a wrong sign
 STATES = ("u", "v", "r", "psi", "north", "east")
 
 
@@ -178,7 +180,7 @@ class _Log:
 
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path over 2.5 ship lengths by dead reckoning with u, v, r."""
-        columns, rows = self.states(motion), self.paths + np.arange(AHEAD + 1)[:, None]
+        columns, rows = self.states(motion), self.paths + np.arange(self.ahead + 1)[:, None]
         u, v, r = (columns[name][rows] for name in ("u", "v", "r"))
 
         def travelled(rate: NDArray[Any]) -> NDArray[Any]:
@@ -194,7 +196,7 @@ class _Log:
         for run, rows in stretches:
             t = np.asarray(rows["t"], dtype=float)
             count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
-            if count > AHEAD and len(t) > 8:
+            if count > SHORTEST and len(t) > 8:
                 grid = t[0] + self.step * np.arange(count)
                 names = [name for name in rows if name not in ("run", "t", "flags")]
                 parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
@@ -228,8 +230,10 @@ class _Log:
         self.block = np.concatenate(blocks)
         self.run = np.concatenate(runs)
         self.fold = (self.run if len(set(self.motion.runs)) >= FOLDS else self.block) % FOLDS
+        lengths = [part.stop - part.start for part in self.motion.stretches]
+        self.ahead = int(np.clip(np.median(lengths) // 3, SHORTEST, AHEAD))
         self.paths = np.concatenate(
-            [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
+            [np.arange(part.start, part.stop - self.ahead, max(every, SHORTEST // 2)) for part in self.motion.stretches]
         ).astype(int)
         self.path_block = self.block[np.clip(np.searchsorted(begin, self.paths), 0, len(begin) - 1)]
         s = np.linspace(-1, 1, POINTS + 1)
@@ -240,8 +244,8 @@ class _Log:
         self.worth = len(begin) * STRIDE / POINTS if every == STRIDE else float(len(begin))
         psi = self.motion.columns["psi"][self.bumps[:, POINTS // 2]]
         self.turn = np.exp(-1j * psi)
-        self.used: Steps = np.unique(self.bumps)
-        self.place = np.searchsorted(self.used, self.bumps)
+        self.used: Steps = np.unique(self.bumps[:, ::EVERY])
+        self.place = np.searchsorted(self.used, self.bumps[:, ::EVERY])
 
     def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
         """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
@@ -257,7 +261,7 @@ class _Log:
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
         heading, fix = summed * speed * psi, max(north, east)
         self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
-        ahead = self.step * AHEAD
+        ahead = self.step * self.ahead
         way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
         self.blind = float(np.linalg.norm([2**0.5 * self.blur, *(way * [u, v, psi, r])]))
         turning = np.hypot(pulled * psi, summed * r)
@@ -266,13 +270,15 @@ class _Log:
         return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
 
     def states(self, motion: Motion) -> dict[str, Array]:
-        """Columns of the states, those of motion smoothed."""
+        """Columns of the states and orders, smoothed: motion by its noise, orders over the steps of the physics."""
         columns = dict(motion.columns)
-        for name in ("u", "v", "r", "psi"):
-            values = np.array(columns[name])
+        for name in ("u", "v", "r", "psi", *self.commands):
+            given, width = columns[name], BETWEEN if name in self.commands else self.smooth
+            columns[name] = values = np.array(given)
             for part in motion.stretches:
-                values[part] = gaussian_filter1d(columns[name][part], self.smooth, mode="nearest")
-            columns[name] = values
+                values[part] = gaussian_filter1d(
+                    np.unwrap(given[part]) if is_steering(name) else given[part], width, mode="nearest"
+                )
         return columns | dict(body_velocities(columns))
 
     def residuals(self, motion: Motion) -> Array:
@@ -294,7 +300,7 @@ class _Log:
             motion = cause.change(self.motion, theta)
             z = self.residuals(motion)
             if cause.scaled:
-                z[list(cause.scaled)] *= np.exp(theta[0])
+                z[list(cause.scaled)] *= np.exp(max(theta[0], 0.0))  # neither way makes less of an error
             return motion, z
 
         begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
@@ -405,7 +411,10 @@ class _VesselLog(_Log):
         """Take another motion for the log, whose actuators and forces are kept."""
         self.motion, self._kept = motion, None
         memory = self.memory(motion)
-        self._kept = memory, np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        self._kept = (
+            memory,
+            np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY])),
+        )
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log or with the vessel."""
@@ -430,7 +439,7 @@ class _VesselLog(_Log):
         same = all(motion.columns[name] is self.motion.columns[name] for name in names)
         if self._kept is not None and same and motion.parameters is self.motion.parameters:
             return self._kept[1]
-        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY]))
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
@@ -450,7 +459,7 @@ class _VesselLog(_Log):
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
         columns, at = self.states(motion), self.paths
-        rows = at + np.arange(AHEAD + 1)[:, None]
+        rows = at + np.arange(self.ahead + 1)[:, None]
         found = rollout_distances(
             self.vessel,
             dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
@@ -463,14 +472,17 @@ class _VesselLog(_Log):
             memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
         )
         far = LOST * self.scales.length
-        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / AHEAD, far)))
+        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / self.ahead, far)))
 
 
 def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
-    """A column at equal steps: an order holds from its row on; motion is averaged over a step, or goes on smoothly."""
-    if is_command(name):
+    """A column at equal steps: an order that stays for some rows holds from its row on; one that
+    changes from row to row goes on evenly; motion is averaged over a step, or goes on smoothly."""
+    if is_command(name) and np.mean(np.diff(values) != 0) < CHANGES:
         last = np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
         return np.asarray(values[np.clip(last, 0, len(t) - 1)])
+    if is_command(name):
+        return np.interp(grid, t, np.unwrap(values) if is_steering(name) else values)
     values = np.unwrap(values) if is_wrapped_angle(name) else values
     step = grid[1] - grid[0]
     if np.median(np.diff(t)) > 0.7 * step:
@@ -565,23 +577,41 @@ def diagnose(
     names = list(dataset.runs if runs is None else runs)
     log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
     causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
-    first, fit = _judge(log, causes)
+    motion, whole = log.motion, log.beyond_noise(log.path_errors(log.motion))
+    first, fit = _judge(log, causes, whole)
     if fit is None:
         return first
-    motion = log.motion
     log.repair(fit.motion)
-    second, other = _judge(log, [one for one in causes if one.key.partition(" / ")[0] != first.cause])
-    if other is not None:
-        log.repair(other.cause.change(motion, other.theta))  # each beside the other
-        fit = log.estimate(fit.cause)
-        log.repair(fit.cause.change(motion, fit.theta))
-        other = log.estimate(other.cause)
-        first, second = _describe(first, fit), _describe(second, other)
+    second, other = _judge(log, _all_but(causes, fit.cause), whole)
+    rivals = [name for name in first.equals if first.cause == UNCLEAR and name != fit.cause.name]
+    if rivals and all(_gain_of(second, name) > BOTH * _gain_of(first, name) for name in rivals):  # both are there
+        first = _describe(replace(first, cause=fit.cause.name, equals=()), fit)
+    if other is not None and second.cause != NONE:  # what was best alone may not be so beside the other
+        log.repair(other.cause.change(motion, other.theta))
+        first, fit = _judge(log, _all_but(causes, other.cause), whole)
+        log.repair(motion if fit is None else fit.cause.change(motion, fit.theta))
+        if second.cause != UNCLEAR:
+            second = _describe(second, log.estimate(other.cause))
+        if first.cause in (NONE, UNCLEAR):
+            first, second = second, first
+    if first.cause == NONE:
+        return first
     return replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
 
 
-def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
-    """The best of all causes as a diagnosis, and its fit where it is named."""
+def _gain_of(result: Diagnosis, name: str) -> float:
+    return max(-misfit for key, misfit in (result.misfits or {}).items() if key.partition(" / ")[0] == name)
+
+
+def _all_but(causes: Sequence[Cause], one: Cause) -> list[Cause]:
+    return [cause for cause in causes if cause.name != one.name]
+
+
+def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis, _Fit | None]:
+    """The best of all causes as a diagnosis, and its fit where it explains more than chance would.
+
+    whole : error [m] of paths by the log as it was given, beyond its noise.
+    """
     base = log.residuals(log.motion)
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
@@ -597,25 +627,24 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     best = fits[order[0]]
     cause, theta = best.cause, best.theta
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
-    ahead, missed = log.step * AHEAD, float(plain[1].mean())
-    share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
-    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
+    before, after = (log.beyond_noise(errors) for errors in (plain[1], seen[order[0]][1]))
+    share, missed = 1 - after / before, float(plain[1].mean())
+    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
-    shown = gain > min(SURE * error, DECISIVE) and (share > least or gain > log.plain * log.worth)
-    if missed < log.blur or not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
+    small = cause.trial and np.linalg.norm(theta) < cause.least
+    if missed < log.blur or small or gain < min(SURE * error, DECISIVE):
         return result, None
-    behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order[1:]}
-    tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
-    near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
-    name = cause.key.partition(" / ")[0]
-    if set(near) - {name, *cause.equals}:
-        alike = (name, *(key for key in near if key != name))
-        sentence = f"{result.how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
-        return replace(result, cause=UNCLEAR, equals=alike, sentence=_with_remedy(sentence, cause.tells)), None
-    unfitted = [key for key in cause.equals if key not in fits]
-    equals = tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name)
-    return _describe(replace(result, cause=name, equals=equals), best), best
+    least = WORTH if cause.trial else WORTH_DISCRETE
+    if min(share, 1.5 * (before - after) / whole) < least and gain < log.plain * log.worth:
+        return result, best
+    behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
+    tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
+    near = list(dict.fromkeys(one.name for one in tied))
+    if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in tied):
+        sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
+        return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=_with_remedy(sentence, cause.tells)), best
+    equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in fits)]))
+    return _describe(replace(result, cause=cause.name, equals=equals), best), best
 
 
 def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
