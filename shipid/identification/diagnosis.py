@@ -89,7 +89,11 @@ PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics
 MOST_SIZES = 2  # that a sentence names
 HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
-SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
+SIGN, SIGN_STEPS, SIGN_ROUNDS = (
+    1.0,
+    4,
+    4,
+)  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
 BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
 DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
@@ -165,10 +169,12 @@ class _Log:
         self.motion = self._resample(runs, stretches)
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
+        self.repair(self.motion)
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log."""
-        self.motion = motion
+        self.motion, self.smoothed = motion, dict[str, tuple[Array, Array]]()
+        self.plain_residuals = self.residuals(motion)
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log."""
@@ -233,7 +239,7 @@ class _Log:
         lengths = [part.stop - part.start for part in self.motion.stretches]
         self.ahead = int(np.clip(np.median(lengths) // 3, SHORTEST, AHEAD))
         self.paths = np.concatenate(
-            [np.arange(part.start, part.stop - self.ahead, max(every, SHORTEST // 2)) for part in self.motion.stretches]
+            [np.arange(part.start, part.stop - self.ahead, max(every, SHORTEST)) for part in self.motion.stretches]
         ).astype(int)
         self.path_block = self.block[np.clip(np.searchsorted(begin, self.paths), 0, len(begin) - 1)]
         s = np.linspace(-1, 1, POINTS + 1)
@@ -273,12 +279,15 @@ class _Log:
         """Columns of the states and orders, smoothed: motion by its noise, orders over the steps of the physics."""
         columns = dict(motion.columns)
         for name in ("u", "v", "r", "psi", *self.commands):
-            given, width = columns[name], BETWEEN if name in self.commands else self.smooth
-            columns[name] = values = np.array(given)
-            for part in motion.stretches:
-                values[part] = gaussian_filter1d(
-                    np.unwrap(given[part]) if is_steering(name) else given[part], width, mode="nearest"
-                )
+            given, known = columns[name], self.smoothed.get(name)
+            if known is None or known[0] is not given:
+                values = np.unwrap(given) if is_steering(name) else given
+                width = BETWEEN if name in self.commands else self.smooth
+                parts = [gaussian_filter1d(values[part], width, mode="nearest") for part in motion.stretches]
+                known = given, np.concatenate(parts)
+            if given is self.motion.columns[name]:
+                self.smoothed[name] = known
+            columns[name] = known[1]
         return columns | dict(body_velocities(columns))
 
     def residuals(self, motion: Motion) -> Array:
@@ -297,6 +306,8 @@ class _Log:
         trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
+            if len(theta) and not theta.any():
+                return self.motion, self.plain_residuals
             motion = cause.change(self.motion, theta)
             z = self.residuals(motion)
             if cause.scaled:
@@ -307,7 +318,13 @@ class _Log:
         theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
         J = np.zeros((len(theta), *z.shape))
         for _ in range(rounds if len(theta) else 0):
-            J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
+            if cause.of_runs:  # all runs at once: none feels the number of another
+                both = [
+                    (change(theta + np.repeat(one, len(theta) // 2) * trials)[1] - z) / trials[0] for one in np.eye(2)
+                ]
+                J = np.array([one * (self.run == run) for one in both for run in range(len(theta) // 2)])
+            else:
+                J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
             step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
             if cause.ratio and not cause.scaled:
                 step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta)
@@ -405,16 +422,16 @@ class _VesselLog(_Log):
         if missing is not None:
             raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
         super().__init__(dataset, runs)
-        self.repair(self.motion)
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log, whose actuators and forces are kept."""
-        self.motion, self._kept = motion, None
+        self.motion, self.smoothed, self._kept = motion, {}, None
         memory = self.memory(motion)
         self._kept = (
             memory,
             np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY])),
         )
+        super().repair(motion)
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log or with the vessel."""
@@ -476,8 +493,10 @@ class _VesselLog(_Log):
 
 
 def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
-    """A column at equal steps: an order that stays for some rows holds from its row on; one that
-    changes from row to row goes on evenly; motion is averaged over a step, or goes on smoothly."""
+    """A column at equal steps: motion is averaged over a step, or goes on smoothly.
+
+    A command that stays for some rows is an order, which holds from its row on, else it goes on evenly.
+    """
     if is_command(name) and np.mean(np.diff(values) != 0) < CHANGES:
         last = np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
         return np.asarray(values[np.clip(last, 0, len(t) - 1)])
@@ -533,8 +552,8 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
 
     They turn astern where u and r change as they do under shafts that turn astern.
     """
-    motion, every = log.motion, np.arange(len(log.motion.columns["u"]))
-    smooth, measured = log.states(motion), np.zeros((2, len(every)))
+    motion, count = log.motion, len(log.motion.columns["u"])
+    smooth, measured, every = log.states(motion), np.zeros((2, count)), np.arange(0, count, SIGN_STEPS)
     for part in motion.stretches:
         rates = (np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r"))
         measured[:, part] = list(rates)
@@ -542,12 +561,14 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     shafts = [name for name in shafts if np.ptp(motion.columns[name]) > 0]
     for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
         ahead, astern = (
-            (measured - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2 for sign in (1, -1)
+            (measured[:, every] - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2
+            for sign in (1, -1)
         )
-        signs = np.ones(len(every))
+        signs = np.ones(count)
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
             level = 1 / log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2], None]
-            signs = _likeliest_signs(((ahead - astern) / level**2).sum(axis=0) / POINTS)
+            less = ((ahead - astern) / level**2).sum(axis=0) * SIGN_STEPS / POINTS
+            signs = np.repeat(_likeliest_signs(less), SIGN_STEPS)[:count]
         if (signs < 0).any():
             together = f" / with {' '.join(names[1:])}" * (len(names) > 1)
             yield Cause(
@@ -612,7 +633,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
 
     whole : error [m] of paths by the log as it was given, beyond its noise.
     """
-    base = log.residuals(log.motion)
+    base = log.plain_residuals
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause) for key in near}
@@ -635,7 +656,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     if missed < log.blur or small or gain < min(SURE * error, DECISIVE):
         return result, None
     least = WORTH if cause.trial else WORTH_DISCRETE
-    if min(share, 1.5 * (before - after) / whole) < least and gain < log.plain * log.worth:
+    if min(share, 1 - after / whole, 1.5 * (before - after) / whole) < least and gain < log.plain * log.worth:
         return result, best
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
