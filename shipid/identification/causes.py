@@ -161,7 +161,8 @@ def _heading_from_course(motion: Motion, _: Array) -> Motion:
 
 def _heading_about_pivot(motion: Motion, ahead: Array) -> Motion:
     """The heading of a log whose drift is lost: of a ship that turns about a point so far ahead [m]."""
-    return _turn_heading(motion, [-np.arctan2(ahead[0] * motion.columns["r"], motion.columns["u"])])
+    u = motion.columns["u"]
+    return _turn_heading(motion, [-np.arctan2(ahead[0] * motion.columns["r"] * np.sign(u), np.abs(u))])
 
 
 def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
