@@ -95,13 +95,10 @@ class Cause:
 
     def repair_text(self, theta: Array) -> str:
         """The repair with the size in it."""
-        words = dict[str, float]()
-        for i, size in enumerate(self.sizes(theta)):
-            words |= {f"{{minus{i}}}": -size, f"{{over{i}}}": 1 / (size or np.inf), f"{{{i}}}": size}
-        text = self.repair
-        for word, value in words.items():
-            text = text.replace(word, f"{value:.4g}")
-        return text
+        sizes = self.sizes(theta)
+        words = {f"minus{i}": f"{-size:.4g}" for i, size in enumerate(sizes)}
+        words |= {f"over{i}": f"{1 / (size or np.inf):.4g}" for i, size in enumerate(sizes)}
+        return self.repair.format(*(f"{size:.4g}" for size in sizes), **words)
 
 
 def list_causes(vessel: Vessel | None, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
@@ -135,12 +132,14 @@ def _negate(name: str, motion: Motion, _: Array) -> Motion:
 
 def _advance(names: Sequence[str], motion: Motion, size: Array) -> Motion:
     """The log with columns moved to the time that they belong to, `size` [s] before they were logged."""
-    moved = {name: np.array(motion.columns[name]) for name in names}
-    for values in moved.values():
-        for part in motion.stretches:
-            at = np.arange(part.stop - part.start, dtype=float)
-            values[part] = np.interp(at + size[0] / motion.step, at, values[part])
-    return motion.put(moved)
+    ends = np.repeat(
+        [(part.start, part.stop - 1) for part in motion.stretches],
+        [part.stop - part.start for part in motion.stretches],
+        axis=0,
+    ).T
+    at = np.arange(len(ends[0]))
+    then = np.clip(at + size[0] / motion.step, *ends)
+    return motion.put({name: np.interp(then, at, motion.columns[name]) for name in names})
 
 
 def _exchange(pairs: Sequence[tuple[str, str]], motion: Motion, _: Array) -> Motion:
@@ -257,9 +256,9 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             equals=equals, tells=f"{COURSES} and at several speeds",
         )  # fmt: skip
     yield Cause(
-        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.003,
+        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.015,
         repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
-        equals=("sensor v bias", "current"), tells=COURSES,
+        equals=("asymmetry of hull or screw", "sensor v bias", "current"), tells=COURSES,
     )  # fmt: skip
     scaled: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
         "u": (("u",), (0, 4)), "v": (("v",), (1,)), "r": (("r",), (2, 3)), "velocity": (VELOCITY, (0, 1, 4, 5))

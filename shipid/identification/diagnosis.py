@@ -197,8 +197,7 @@ class _Log:
         return np.asarray(np.abs(place[1:] - place[0] - travelled((u + 1j * v) * np.exp(1j * heading))).mean(axis=0))
 
     def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
-        parts: list[dict[str, Array]] = []
-        places: list[int] = []
+        parts, places = list[dict[str, Array]](), list[int]()
         for run, rows in stretches:
             t = np.asarray(rows["t"], dtype=float)
             count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
@@ -221,20 +220,12 @@ class _Log:
 
     def _cut(self, duration: float) -> None:
         """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
-        begins, blocks, runs = list[Steps](), list[Steps](), list[Steps]()
-        first = 0
         every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
-        for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
-            here = np.arange(part.start, part.stop - POINTS - 1, every)
-            number = np.arange(len(here)) // BLOCK
-            begins.append(here)
-            blocks.append(number + first)
-            first += int(number.max(initial=-1)) + 1
-            runs.append(np.full(len(here), run))
-        begin = np.concatenate(begins)
+        here = [np.arange(part.start, part.stop - POINTS - 1, every) for part in self.motion.stretches]
+        begin, counts = np.concatenate(here), [len(places) for places in here]
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
-        self.block = np.concatenate(blocks)
-        self.run = np.concatenate(runs)
+        self.block = np.cumsum(np.concatenate([np.arange(count) % BLOCK == 0 for count in counts])) - 1
+        self.run = np.repeat(self.motion.runs, counts)
         self.fold = (self.run if len(set(self.motion.runs)) >= FOLDS else self.block) % FOLDS
         lengths = [part.stop - part.start for part in self.motion.stretches]
         self.ahead = int(np.clip(np.median(lengths) // 3, SHORTEST, AHEAD))
@@ -248,8 +239,7 @@ class _Log:
         slope = slope - slope.mean()
         self.pull = slope / (slope @ t)
         self.worth = len(begin) * STRIDE / POINTS if every == STRIDE else float(len(begin))
-        psi = self.motion.columns["psi"][self.bumps[:, POINTS // 2]]
-        self.turn = np.exp(-1j * psi)
+        self.turn = np.exp(-1j * self.motion.columns["psi"][self.bumps[:, POINTS // 2]])
         self.used: Steps = np.unique(self.bumps[:, ::EVERY])
         self.place = np.searchsorted(self.used, self.bumps[:, ::EVERY])
 
@@ -527,22 +517,6 @@ def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
     )
 
 
-def _likeliest_signs(astern: Array) -> Array:
-    """Signs (N,) of least misfit, where each change of the sign costs `SIGN` (Viterbi).
-
-    astern : (N,) by how much less the misfit is with -1.
-    """
-    cost, came = np.zeros(2), np.zeros((len(astern), 2), dtype=int)
-    for i, less in enumerate(astern):
-        came[i] = [int(cost[1] + SIGN < cost[0]), int(cost[1] <= cost[0] + SIGN)]
-        cost = np.minimum(cost, cost[::-1] + SIGN) - [0.0, less]
-    state, signs = int(np.argmin(cost)), np.ones(len(astern))
-    for i in range(len(astern) - 1, -1, -1):
-        signs[i] -= 2 * state
-        state = came[i, state]
-    return signs
-
-
 def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
     return motion.put({name: signs * motion.columns[name] for name in names})
 
@@ -568,7 +542,7 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
             level = 1 / log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2], None]
             less = ((ahead - astern) / level**2).sum(axis=0) * SIGN_STEPS / POINTS
-            signs = np.repeat(_likeliest_signs(less), SIGN_STEPS)[:count]
+            signs = np.repeat(np.where(gaussian_filter1d(less, SIGN) > 0, -1.0, 1.0), SIGN_STEPS)[:count]
         if (signs < 0).any():
             together = f" / with {' '.join(names[1:])}" * (len(names) > 1)
             yield Cause(
@@ -638,7 +612,8 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause) for key in near}
     forces = log.gain_of_forces(base)
-    cost = {cause.key: cause.cost + forces * cause.of_runs for cause in causes}
+    small = {key: bool(fit.cause.trial) and np.linalg.norm(fit.theta) < fit.cause.least for key, fit in fits.items()}
+    cost = {cause.key: cause.cost + forces * cause.of_runs + (np.inf if small[cause.key] else 0) for cause in causes}
     misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
@@ -646,14 +621,13 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
     best = fits[order[0]]
-    cause, theta = best.cause, best.theta
+    cause = best.cause
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
     before, after = (log.beyond_noise(errors) for errors in (plain[1], seen[order[0]][1]))
     share, missed = 1 - after / before, float(plain[1].mean())
     result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    small = cause.trial and np.linalg.norm(theta) < cause.least
-    if missed < log.blur or small or gain < min(SURE * error, DECISIVE):
+    if missed < log.blur or gain < min(SURE * error, DECISIVE):
         return result, None
     least = WORTH if cause.trial else WORTH_DISCRETE
     if min(share, 1 - after / whole, 1.5 * (before - after) / whole) < least and gain < log.plain * log.worth:
