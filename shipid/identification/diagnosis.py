@@ -166,14 +166,14 @@ class _Log:
         self.scales = Scales(length, max(speed, 1e-6 * length / usual), usual)
         self.width = max(min(LENGTHS * self.scales.passing, longest / 4), 8 * usual)
         self.step = self.width / POINTS
-        self.motion = self._resample(runs, stretches)
+        self.motion, self.smoothed = self._resample(runs, stretches), dict[str, tuple[Array, Array]]()
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
         self.repair(self.motion)
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log."""
-        self.motion, self.smoothed = motion, dict[str, tuple[Array, Array]]()
+        self.motion, self.smoothed = motion, {}
         self.plain_residuals = self.residuals(motion)
 
     def causes(self) -> list[Cause]:
@@ -306,15 +306,13 @@ class _Log:
 
         begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
         theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
-        J = np.zeros((len(theta), *z.shape))
+        J, unit = np.zeros((len(theta), *z.shape)), np.eye(len(theta))
+        if cause.of_runs:  # a change of all runs at once: none feels the number of another
+            unit = np.repeat(np.eye(2), len(theta) // 2, axis=1)
         for _ in range(rounds if len(theta) else 0):
-            if cause.of_runs:  # all runs at once: none feels the number of another
-                both = [
-                    (change(theta + np.repeat(one, len(theta) // 2) * trials)[1] - z) / trials[0] for one in np.eye(2)
-                ]
-                J = np.array([one * (self.run == run) for one in both for run in range(len(theta) // 2)])
-            else:
-                J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
+            J = np.array([(change(theta + one)[1] - z) / one.max() for one in unit * trials])
+            if cause.of_runs:
+                J = np.concatenate([one * (self.run == np.arange(len(theta) // 2)[:, None, None]) for one in J])
             step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
             if cause.ratio and not cause.scaled:
                 step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta)
@@ -399,6 +397,7 @@ class _Log:
 class _VesselLog(_Log):
     """A log with the vessel that should have made it."""
 
+    _kept: tuple[Array, Array] | None = None
     plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
     def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str], environment: Mapping[str, float]) -> None:
@@ -415,12 +414,8 @@ class _VesselLog(_Log):
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log, whose actuators and forces are kept."""
-        self.motion, self.smoothed, self._kept = motion, {}, None
-        memory = self.memory(motion)
-        self._kept = (
-            memory,
-            np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY])),
-        )
+        kept = self.memory(motion), self.forces(motion)
+        self.motion, self._kept = motion, kept
         super().repair(motion)
 
     def causes(self) -> list[Cause]:
@@ -432,17 +427,18 @@ class _VesselLog(_Log):
         orders = {name: motion.columns[name] for name in self.commands}
         if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
             return self._kept[0]
-        result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
-        for part in motion.stretches if self.model.memory else ():
-            given = {name: values[part] for name, values in orders.items()}
-            reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
-            result[:, part] = np.array([reached[name] for name in self.model.memory])
-        return result
+        reached = [
+            memory_along(self.vessel, {name: x[part] for name, x in orders.items()}, motion.step * np.arange(count))
+            or {}
+            for part, count in ((part, part.stop - part.start) for part in motion.stretches)
+        ]
+        series = [np.concatenate([one[name] for one in reached]) for name in self.model.memory]
+        return np.reshape(series, (len(series), len(motion.columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
-        names = ["u", "v", "r", *self.commands, *self.environment]
-        names += ["psi"] if any(motion.columns[name].any() for name in self.environment) else []
+        turned = any(motion.columns[name].any() for name in self.environment)
+        names = ["u", "v", "r", *self.commands, *self.environment, *["psi"] * turned]
         same = all(motion.columns[name] is self.motion.columns[name] for name in names)
         if self._kept is not None and same and motion.parameters is self.motion.parameters:
             return self._kept[1]
@@ -585,13 +581,11 @@ def diagnose(
         log.repair(other.cause.change(motion, other.theta))
         first, fit = _judge(log, _all_but(causes, other.cause), whole)
         log.repair(motion if fit is None else fit.cause.change(motion, fit.theta))
-        if second.cause != UNCLEAR:
-            second = _describe(second, log.estimate(other.cause))
+        second = second if second.cause == UNCLEAR else _describe(second, log.estimate(other.cause))
         if first.cause in (NONE, UNCLEAR):
             first, second = second, first
-    if first.cause == NONE:
-        return first
-    return replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
+    both = replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
+    return first if first.cause == NONE else both
 
 
 def _gain_of(result: Diagnosis, name: str) -> float:
@@ -620,8 +614,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
     misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
-    best = fits[order[0]]
-    cause = best.cause
+    best, cause = fits[order[0]], fits[order[0]].cause
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
     before, after = (log.beyond_noise(errors) for errors in (plain[1], seen[order[0]][1]))
     share, missed = 1 - after / before, float(plain[1].mean())
@@ -629,8 +622,8 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     if missed < log.blur or gain < min(SURE * error, DECISIVE):
         return result, None
-    least = WORTH if cause.trial else WORTH_DISCRETE
-    if min(share, 1 - after / whole, 1.5 * (before - after) / whole) < least and gain < log.plain * log.worth:
+    worth = min(share, 1 - after / whole, 1.5 * (before - after) / whole)
+    if worth < (WORTH if cause.trial else WORTH_DISCRETE) and gain < log.plain * log.worth:
         return result, best
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
