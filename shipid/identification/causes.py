@@ -315,7 +315,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     )  # fmt: skip
     if count > 1:
         yield Cause(
-            "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
+            "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least * count**0.5,
             repair='--set current="by run"', equals=equals, tells=COURSES, of_runs=True,
         )  # fmt: skip
     yield Cause(

@@ -170,6 +170,14 @@ class _Log:
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
         self.repair(self.motion)
+        random = np.random.default_rng(0)
+        noisy = {
+            name: self.motion.columns[name] + random.normal(0, size, len(self.motion.columns[name]))
+            for name, size in self.white.items()
+        }
+        self.plain_errors = self.path_errors(self.motion)
+        more = self.path_errors(self.motion.put(noisy)).mean() ** 2 - self.plain_errors.mean() ** 2
+        self.blind = float(np.hypot(max(more, 0.0) ** 0.5, self.blur))
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log."""
@@ -245,7 +253,7 @@ class _Log:
 
     def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
         """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
-        share = min(usual / self.step, 1.0) ** 0.5
+        share = (usual / self.step) ** 0.5
         series = {name: [np.asarray(rows[name], dtype=float) for _, rows in stretches] for name in STATES}
         series["psi"] = [np.unwrap(values) for values in series["psi"]]
         u, v, r, psi, north, east = (share * np.median([*map(white_noise_of, series[name])]) for name in STATES)
@@ -257,9 +265,7 @@ class _Log:
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
         heading, fix = summed * speed * psi, max(north, east)
         self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
-        ahead = self.step * self.ahead
-        way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
-        self.blind = float(np.linalg.norm([2**0.5 * self.blur, *(way * [u, v, psi, r])]))
+        self.white = dict(zip(STATES, (u, v, r, psi, north, east), strict=True))
         turning = np.hypot(pulled * psi, summed * r)
         along, across = (np.hypot(pulled * fix, summed * one) for one in (u, v))
         noise = [pulled * u, pulled * v, pulled * r, turning, along, np.hypot(across, heading)]
@@ -568,7 +574,7 @@ def diagnose(
     names = list(dataset.runs if runs is None else runs)
     log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
     causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
-    motion, whole = log.motion, log.beyond_noise(log.path_errors(log.motion))
+    motion, whole = log.motion, log.beyond_noise(log.plain_errors)
     first, fit = _judge(log, causes, whole)
     if fit is None:
         return first
@@ -614,21 +620,25 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
     misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
-    best, cause = fits[order[0]], fits[order[0]].cause
+    before, missed = log.beyond_noise(plain[1]), float(plain[1].mean())
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
-    before, after = (log.beyond_noise(errors) for errors in (plain[1], seen[order[0]][1]))
-    share, missed = 1 - after / before, float(plain[1].mean())
-    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
+    left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
+    worth = {key: min(1 - x / before, 1 - x / whole, 1.5 * (before - x) / whole) for key, x in left.items()}
+    result = Diagnosis(NONE, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
+    result = replace(result, share=1 - left[order[0]] / before)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     if missed < log.blur or gain < min(SURE * error, DECISIVE):
         return result, None
-    worth = min(share, 1 - after / whole, 1.5 * (before - after) / whole)
-    if worth < (WORTH if cause.trial else WORTH_DISCRETE) and gain < log.plain * log.worth:
-        return result, best
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
-    near = list(dict.fromkeys(one.name for one in tied))
-    if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in tied):
+    told = [
+        one for one in tied if worth[one.key] > (WORTH if one.trial else WORTH_DISCRETE) or gain > log.plain * log.worth
+    ]
+    if not told:
+        return result, fits[order[0]]
+    cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
+    result = replace(result, share=1 - left[cause.key] / before)
+    if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):
         sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
         return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=_with_remedy(sentence, cause.tells)), best
     equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in fits)]))
