@@ -31,17 +31,18 @@ that do not overlap: it is free of scale, and an equation in which the vessel is
 white noise that the log itself shows, as it passes the bump, and `EXACT` of the size of the terms. A cause is
 estimated without a part of the runs (or of the time, where there is one run) and its misfit is taken on that part.
 
-The causes of least misfit also predict paths of 2.5 ship lengths, whose errors count as a seventh equation.
+The causes of least misfit also predict paths of 5 ship lengths, whose errors count as a seventh equation. How far noise
+makes them err is seen on the log with its noise once more.
 
-- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or the
-  one that does lowers the error of the paths by less than a share `WORTH`; or that error is noise; or the cause is
-  smaller than what a log has anyhow (a command that is a row late).
-- The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
-  the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
-  and `equals` are the causes that remain.
+- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or those
+  that do so lower the error of the paths by less than a share `WORTH`; or that error is noise; or they are smaller than
+  what a log has anyhow (a command that is a row late).
+- Causes tie with that of least misfit where they are worse by less than `APART` standard errors, or the share `ALIKE`
+  of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
+  `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
 - `current by run` gains only what is beyond an unknown force of each run, as gusts are.
-- A second cause is looked for in the same way once the log is repaired from the first; then each is fitted beside the
-  other.
+- A second cause is looked for once the log is repaired from the best, even where that is not worth naming alone: then
+  the best is sought again beside the second. A rival that gains as much as before (`BOTH`) was no rival but is there.
 """
 
 from __future__ import annotations
