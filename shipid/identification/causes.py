@@ -271,9 +271,10 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             equals=same.get(key, ()), tells=SPEEDS,
         )  # fmt: skip
     for name in ("v", "r", "psi"):
-        words = f"[columns.{name}]\nsign = -1  # times what is there"
-        yield Cause(f"sensor {name} sign", partial(_negate, name), repair=words)
-    of_velocity = ("sensor velocity delay",)
+        yield Cause(
+            f"sensor {name} sign", partial(_negate, name), repair=f"[columns.{name}]\nsign = -1  # times what is there"
+        )  # fmt: skip
+    of_velocity, gyro = ("sensor velocity delay",), "name the column of a gyro or a compass as psi"
     late: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
         "u": (("u",), "velocity", of_velocity),
         "v": (("v",), "velocity", of_velocity),
@@ -289,7 +290,6 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
             equals=equals, tells="turns to both sides",
         )  # fmt: skip
-    gyro = "name the column of a gyro or a compass as psi"
     yield Cause("heading is course", _heading_from_course, repair=gyro)
     yield Cause(
         "heading is course / and drift is lost", _heading_about_pivot, (0.05 * scales.length,), "m", repair=gyro,

@@ -222,8 +222,8 @@ class _Log:
         shared = set.intersection(*(set(part) for part in parts))
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
         columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
-        rest = self.environment.keys() - columns.keys()
-        columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in sorted(rest)}
+        rest = sorted(self.environment.keys() - columns.keys())
+        columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in rest}
         slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
 
@@ -366,8 +366,7 @@ class _Log:
         bread = np.linalg.pinv(np.einsum("icw,jcw->ij", A, A), rcond=1e-12)
         of_block = self.block[:, None] == np.arange(int(self.block.max()) + 1)
         score = bread @ np.einsum("icw,cw->iw", A, e) @ of_block
-        covariance: Array = score @ score.T
-        return covariance
+        return np.asarray(score @ score.T)
 
     def misfit(self, z: Array) -> float:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
@@ -532,10 +531,10 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     motion, count = log.motion, len(log.motion.columns["u"])
     smooth, measured, every = log.states(motion), np.zeros((2, count)), np.arange(0, count, SIGN_STEPS)
     for part in motion.stretches:
-        rates = (np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r"))
-        measured[:, part] = list(rates)
-    shafts = [name for name in filter(is_shaft, log.commands) if motion.columns[name].min() >= 0]
-    shafts = [name for name in shafts if np.ptp(motion.columns[name]) > 0]
+        smoother = (gaussian_filter1d(smooth[name][part], SMOOTH) for name in ("u", "r"))
+        measured[:, part] = [np.gradient(values, log.step) for values in smoother]
+    turning = {name: motion.columns[name] for name in filter(is_shaft, log.commands)}
+    shafts = [name for name, values in turning.items() if 0 <= values.min() < values.max()]
     for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
         ahead, astern = (
             (measured[:, every] - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2
@@ -543,13 +542,12 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
         )
         signs = np.ones(count)
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
-            level = 1 / log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2], None]
-            less = ((ahead - astern) / level**2).sum(axis=0) * SIGN_STEPS / POINTS
-            signs = np.repeat(np.where(gaussian_filter1d(less, SIGN) > 0, -1.0, 1.0), SIGN_STEPS)[:count]
+            weight = log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2]]
+            less = gaussian_filter1d(weight**2 @ (ahead - astern), SIGN)
+            signs = np.repeat(np.where(less > 0, -1.0, 1.0), SIGN_STEPS)[:count]
         if (signs < 0).any():
-            together = f" / with {' '.join(names[1:])}" * (len(names) > 1)
             yield Cause(
-                f"command {names[0]} unsigned{together}",
+                " ".join([f"command {names[0]} unsigned", *(["/ with", *names[1:]] if len(names) > 1 else [])]),
                 partial(_put_signs, names, signs),
                 repair=f"{' and '.join(names)} without a sign: give the column that says ahead or astern",
                 equals=tuple(f"command {name} unsigned" for name in shafts),
@@ -625,8 +623,8 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
     left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
     worth = {key: min(1 - x / before, 1 - x / whole, 1.5 * (before - x) / whole) for key, x in left.items()}
-    result = Diagnosis(NONE, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
-    result = replace(result, share=1 - left[order[0]] / before)
+    share, ahead = 1 - left[order[0]] / before, log.step * log.ahead
+    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     if missed < log.blur or gain < min(SURE * error, DECISIVE):
         return result, None
