@@ -85,6 +85,11 @@ class Cause:
     of_runs: bool = False
 
     @property
+    def remedy(self) -> str:
+        """What would tell the class apart, as the end of a sentence."""
+        return f": to tell them apart, {self.tells}" * bool(self.tells)
+
+    @property
     def name(self) -> str:
         """The key without the words that tell variants of a cause apart."""
         return self.key.partition(" / ")[0]

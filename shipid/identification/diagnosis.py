@@ -132,8 +132,7 @@ class Diagnosis:
     @property
     def how_far(self) -> str:
         """The error of the paths in words."""
-        noise = f"noise alone: {self.noise:.2g} m"
-        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average ({noise})"
+        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average (noise alone: {self.noise:.2g} m)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,12 +218,12 @@ class _Log:
             raise DataError(
                 f"no stretch is longer than {self.width:.3g} s, in which the ship runs {LENGTHS:g} lengths", path="runs"
             )
-        shared = set.intersection(*(set(part) for part in parts))
+        shared = sorted(set.intersection(*(set(part) for part in parts)))
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in shared}
         rest = sorted(self.environment.keys() - columns.keys())
         columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in rest}
-        slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        slices = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
         return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
 
     def _cut(self, duration: float) -> None:
@@ -261,7 +260,7 @@ class _Log:
         sizes = (np.sqrt(np.mean(self.motion.columns[name] ** 2)) for name in ("u", "v", "r"))
         rough = max(noise / max(size, 1e-12) for noise, size in zip((u, v, r), sizes, strict=True))
         self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
-        pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
+        pulled, summed = (float(np.linalg.norm(one)) for one in (self.pull, self.phi))
         speed, passing = self.scales.speed, self.scales.passing
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
         heading, fix = summed * speed * psi, max(north, east)
@@ -413,8 +412,7 @@ class _VesselLog(_Log):
         self.length, self.commands = vessel.length, self.model.commands
         self.environment = {name: environment.get(name, 0.0) for name in self.model.environment}
         self.numbers = tuple(vessel.parameters.values())
-        missing = next((name for name in self.commands if name not in dataset.commands), None)
-        if missing is not None:
+        for missing in (name for name in self.commands if name not in dataset.commands):
             raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
         super().__init__(dataset, runs)
 
@@ -578,13 +576,13 @@ def diagnose(
     if fit is None:
         return first
     log.repair(fit.motion)
-    second, other = _judge(log, _all_but(causes, fit.cause), whole)
+    second, other = _judge(log, [one for one in causes if one.name != fit.cause.name], whole)
     rivals = [name for name in first.equals if first.cause == UNCLEAR and name != fit.cause.name]
     if rivals and all(_gain_of(second, name) > BOTH * _gain_of(first, name) for name in rivals):  # both are there
         first = _describe(replace(first, cause=fit.cause.name, equals=()), fit)
     if other is not None and second.cause != NONE:  # what was best alone may not be so beside the other
         log.repair(other.cause.change(motion, other.theta))
-        first, fit = _judge(log, _all_but(causes, other.cause), whole)
+        first, fit = _judge(log, [one for one in causes if one.name != other.cause.name], whole)
         log.repair(motion if fit is None else fit.cause.change(motion, fit.theta))
         second = second if second.cause == UNCLEAR else _describe(second, log.estimate(other.cause))
         if first.cause in (NONE, UNCLEAR):
@@ -597,10 +595,6 @@ def _gain_of(result: Diagnosis, name: str) -> float:
     return max(-misfit for key, misfit in (result.misfits or {}).items() if key.partition(" / ")[0] == name)
 
 
-def _all_but(causes: Sequence[Cause], one: Cause) -> list[Cause]:
-    return [cause for cause in causes if cause.name != one.name]
-
-
 def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis, _Fit | None]:
     """The best of all causes as a diagnosis, and its fit where it explains more than chance would.
 
@@ -610,9 +604,11 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause) for key in near}
-    forces = log.gain_of_forces(base)
-    small = {key: bool(fit.cause.trial) and np.linalg.norm(fit.theta) < fit.cause.least for key, fit in fits.items()}
-    cost = {cause.key: cause.cost + forces * cause.of_runs + (np.inf if small[cause.key] else 0) for cause in causes}
+    cost = {
+        key: np.inf if fit.cause.trial and np.linalg.norm(fit.theta) < fit.cause.least else fit.cause.cost
+        for key, fit in fits.items()
+    }
+    cost |= {cause.key: cost[cause.key] + log.gain_of_forces(base) for cause in causes if cause.of_runs}
     misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
@@ -639,7 +635,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     result = replace(result, share=1 - left[cause.key] / before)
     if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):
         sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
-        return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=_with_remedy(sentence, cause.tells)), best
+        return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=sentence + cause.remedy), best
     equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in fits)]))
     return _describe(replace(result, cause=cause.name, equals=equals), best), best
 
@@ -651,15 +647,10 @@ def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
     interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
     words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
+    sized, unit = f"{' = ' * bool(words)}{', '.join(words)}", cause.unit.strip("1")
     sentence = (
-        f"{result.how_far}: {result.cause}{' = ' * bool(words)}{', '.join(words)}{' ' * bool(cause.unit.strip('1'))}"
+        f"{result.how_far}: {result.cause}{sized}{' ' * bool(unit)}{unit} explains {percent_text(result.share)} of "
+        f"what is no noise; {' '.join(repair.split())}"
     )
-    sentence += (
-        f"{cause.unit.strip('1')} explains {percent_text(result.share)} of what is no noise; {' '.join(repair.split())}"
-    )
-    sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
+    sentence += f"; {' or '.join(equals)} would look alike{cause.remedy}" if equals else ""
     return replace(result, size=sizes, interval=interval, repair=repair, sentence=sentence)
-
-
-def _with_remedy(sentence: str, tells: str) -> str:
-    return f"{sentence}: to tell them apart, {tells}" if tells else sentence
