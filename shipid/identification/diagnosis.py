@@ -41,8 +41,8 @@ makes them err is seen on the log with its noise once more.
   of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
   `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
 - `current by run` gains only what is beyond an unknown force of each run, as gusts are.
-- A second cause is looked for once the log is repaired from the best, even where that is not worth naming alone: then
-  the best is sought again beside the second. A rival that gains as much as before (`BOTH`) was no rival but is there.
+- A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
+  naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) was no rival but is there.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its step
 CHANGES = 0.5  # share of the rows with a change: from there on a command is measured, below it is an order
 EVERY, BETWEEN = 2, 0.7  # steps from one evaluation of the physics to the next; over which an order is a mean
 MOST_PASSING = 200  # rows in which a ship of unknown length runs it, at most
-MOST_BUMPS = 200  # of a log: of a longer one parts are taken, evenly
+MOST_BUMPS = 160  # of a log: of a longer one parts are taken, evenly
 SMOOTH, NOISY = POINTS / 24, 0.03  # steps, of the smoothing before the forces; noise over signal from which it grows
 EXACT = 0.01  # of the size of the terms: what no resampled log says better
 SHORTEST, AHEAD = 40, 80  # steps of a stretch; of a predicted path, 5 ship lengths where the runs are long enough
@@ -238,7 +238,7 @@ class _Log:
         lengths = [part.stop - part.start for part in self.motion.stretches]
         self.ahead = int(np.clip(np.median(lengths) // 3, SHORTEST, AHEAD))
         self.paths = np.concatenate(
-            [np.arange(part.start, part.stop - self.ahead, max(every, SHORTEST)) for part in self.motion.stretches]
+            [np.arange(part.start, part.stop - self.ahead, max(2 * every, SHORTEST)) for part in self.motion.stretches]
         ).astype(int)
         self.path_block = self.block[np.clip(np.searchsorted(begin, self.paths), 0, len(begin) - 1)]
         s = np.linspace(-1, 1, POINTS + 1)
@@ -630,7 +630,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
         one for one in tied if worth[one.key] > (WORTH if one.trial else WORTH_DISCRETE) or gain > log.plain * log.worth
     ]
     if not told:
-        return result, fits[order[0]]
+        return result, fits[order[0]] if gain > DECISIVE else None
     cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
     result = replace(result, share=1 - left[cause.key] / before)
     if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):
