@@ -42,7 +42,8 @@ makes them err is seen on the log with its noise once more.
   `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
 - `current by run` gains only what is beyond an unknown force of each run, as gusts are.
 - A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
-  naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) was no rival but is there.
+  naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
+  as well.
 """
 
 from __future__ import annotations
@@ -297,8 +298,8 @@ class _Log:
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
         return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
 
-    def estimate(self, cause: Cause, rounds: int = ROUNDS) -> _Fit:
-        """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
+    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: Array | None = None) -> _Fit:
+        """Fit a cause by Gauss-Newton from a size or the start of least misfit; one that lowers nothing stays."""
         trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
@@ -310,8 +311,8 @@ class _Log:
                 z[list(cause.scaled)] *= np.exp(max(theta[0], 0.0))  # neither way makes less of an error
             return motion, z
 
-        begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
-        theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
+        begins = [np.zeros(len(trials)), *map(np.atleast_1d, cause.starts)] if begin is None else [begin]
+        theta, (motion, z) = min(((one, change(one)) for one in begins), key=lambda one: self.misfit(one[1][1]))
         J, unit = np.zeros((len(theta), *z.shape)), np.eye(len(theta))
         if cause.of_runs:  # a change of all runs at once: none feels the number of another
             unit = np.repeat(np.eye(2), len(theta) // 2, axis=1)
@@ -603,7 +604,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     base = log.plain_residuals
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
-    fits = first | {key: log.estimate(first[key].cause) for key in near}
+    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
     cost = {
         key: np.inf if fit.cause.trial and np.linalg.norm(fit.theta) < fit.cause.least else fit.cause.cost
         for key, fit in fits.items()
