@@ -114,7 +114,7 @@ class Diagnosis:
         noise, that it explains.
     noise : mean error [m] of these paths by the noise of the log alone.
     next : the same of a second cause beside the first, if there is one; sizes are those beside each other.
-    misfits : key -> misfit on parts left out, less that of `none`.
+    misfits : key -> misfit on parts left out, less that of `none`; infinite where a cause is too small to matter.
     """
 
     cause: str
