@@ -41,17 +41,16 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     by_run = stretches_by_run(dataset)
     motions = {run: _motion(stretches) for run, stretches in by_run.items()}
-    table = []
-    for run, stretches in by_run.items():
-        table += [
-            {"run": run, **row}
-            for row in (
-                *_check_clock(stretches),
-                *_check_ranges(stretches),
-                _check_frozen(stretches),
-                _check_overlap(run, motions, shares_clock(dataset)),
-            )
-        ]
+    table = [
+        {"run": run, **row}
+        for run, stretches in by_run.items()
+        for row in (
+            *_check_clock(stretches),
+            *_check_ranges(stretches),
+            _check_frozen(stretches),
+            _check_overlap(run, motions, shares_clock(dataset)),
+        )
+    ]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 

@@ -84,19 +84,26 @@ class Cause:
     cost: float = 0.0
     of_runs: bool = False
 
+    @property
+    def remedy(self) -> str:
+        """What would tell the class apart, as the end of a sentence."""
+        return f": to tell them apart, {self.tells}" * bool(self.tells)
+
+    @property
+    def name(self) -> str:
+        """The key without the words that tell variants of a cause apart."""
+        return self.key.partition(" / ")[0]
+
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
         return tuple((np.exp(theta) if self.ratio else theta).tolist())
 
     def repair_text(self, theta: Array) -> str:
         """The repair with the size in it."""
-        words = dict[str, float]()
-        for i, size in enumerate(self.sizes(theta)):
-            words |= {f"{{minus{i}}}": -size, f"{{over{i}}}": 1 / (size or np.inf), f"{{{i}}}": size}
-        text = self.repair
-        for word, value in words.items():
-            text = text.replace(word, f"{value:.4g}")
-        return text
+        sizes = self.sizes(theta)
+        words = {f"minus{i}": f"{-size:.4g}" for i, size in enumerate(sizes)}
+        words |= {f"over{i}": f"{1 / (size or np.inf):.4g}" for i, size in enumerate(sizes)}
+        return self.repair.format(*(f"{size:.4g}" for size in sizes), **words)
 
 
 def list_causes(vessel: Vessel | None, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
@@ -130,19 +137,21 @@ def _negate(name: str, motion: Motion, _: Array) -> Motion:
 
 def _advance(names: Sequence[str], motion: Motion, size: Array) -> Motion:
     """The log with columns moved to the time that they belong to, `size` [s] before they were logged."""
-    moved = {name: np.array(motion.columns[name]) for name in names}
-    for values in moved.values():
-        for part in motion.stretches:
-            at = np.arange(part.stop - part.start, dtype=float)
-            values[part] = np.interp(at + size[0] / motion.step, at, values[part])
-    return motion.put(moved)
+    ends = np.repeat(
+        [(part.start, part.stop - 1) for part in motion.stretches],
+        [part.stop - part.start for part in motion.stretches],
+        axis=0,
+    ).T
+    at = np.arange(len(ends[0]))
+    then = np.clip(at + size[0] / motion.step, *ends)
+    return motion.put({name: np.interp(then, at, motion.columns[name]) for name in names})
 
 
 def _exchange(pairs: Sequence[tuple[str, str]], motion: Motion, _: Array) -> Motion:
     return motion.put({a: motion.columns[b] for pair in pairs for a, b in (pair, pair[::-1])})
 
 
-def _turn_heading(motion: Motion, size: Array) -> Motion:
+def _turn_heading(motion: Motion, size: Array | Sequence[Array]) -> Motion:
     """The heading less a bias, and velocities turned with it: those over ground stay."""
     columns = motion.columns
     turned = (columns["u"] + 1j * columns["v"]) * np.exp(1j * size[0])
@@ -152,6 +161,12 @@ def _turn_heading(motion: Motion, size: Array) -> Motion:
 def _heading_from_course(motion: Motion, _: Array) -> Motion:
     columns = motion.columns
     return motion.put({"psi": columns["psi"] - np.arctan2(columns["v"], columns["u"])})
+
+
+def _heading_about_pivot(motion: Motion, ahead: Array) -> Motion:
+    """The heading of a log whose drift is lost: of a ship that turns about a point so far ahead [m]."""
+    u = motion.columns["u"]
+    return _turn_heading(motion, [-np.arctan2(ahead[0] * motion.columns["r"] * np.sign(u), np.abs(u))])
 
 
 def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
@@ -246,9 +261,9 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             equals=equals, tells=f"{COURSES} and at several speeds",
         )  # fmt: skip
     yield Cause(
-        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.003,
+        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.015,
         repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
-        equals=("sensor v bias", "current"), tells=COURSES,
+        equals=("asymmetry of hull or screw", "sensor v bias", "current"), tells=COURSES,
     )  # fmt: skip
     scaled: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
         "u": (("u",), (0, 4)), "v": (("v",), (1,)), "r": (("r",), (2, 3)), "velocity": (VELOCITY, (0, 1, 4, 5))
@@ -261,9 +276,10 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             equals=same.get(key, ()), tells=SPEEDS,
         )  # fmt: skip
     for name in ("v", "r", "psi"):
-        words = f"[columns.{name}]\nsign = -1  # times what is there"
-        yield Cause(f"sensor {name} sign", partial(_negate, name), repair=words)
-    of_velocity = ("sensor velocity delay",)
+        yield Cause(
+            f"sensor {name} sign", partial(_negate, name), repair=f"[columns.{name}]\nsign = -1  # times what is there"
+        )  # fmt: skip
+    of_velocity, gyro = ("sensor velocity delay",), "name the column of a gyro or a compass as psi"
     late: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
         "u": (("u",), "velocity", of_velocity),
         "v": (("v",), "velocity", of_velocity),
@@ -279,7 +295,11 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
             equals=equals, tells="turns to both sides",
         )  # fmt: skip
-    yield Cause("heading is course", _heading_from_course, repair="name the column of a gyro or a compass as psi")
+    yield Cause("heading is course", _heading_from_course, repair=gyro)
+    yield Cause(
+        "heading is course / and drift is lost", _heading_about_pivot, (0.05 * scales.length,), "m", repair=gyro,
+        starts=(0.4 * scales.length,), equals=("sensor v scale",),
+    )  # fmt: skip
     arms = {"position": ("lever arm velocity", "sensor position delay"), "velocity": ("lever arm position",)}
     for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
         yield Cause(
@@ -300,7 +320,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     )  # fmt: skip
     if count > 1:
         yield Cause(
-            "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least,
+            "current by run", partial(_add_current, run), 2 * count * (trial,), "m/s", least * count**0.5,
             repair='--set current="by run"', equals=equals, tells=COURSES, of_runs=True,
         )  # fmt: skip
     yield Cause(

@@ -31,17 +31,19 @@ that do not overlap: it is free of scale, and an equation in which the vessel is
 white noise that the log itself shows, as it passes the bump, and `EXACT` of the size of the terms. A cause is
 estimated without a part of the runs (or of the time, where there is one run) and its misfit is taken on that part.
 
-The causes of least misfit also predict paths of 2.5 ship lengths, whose errors count as a seventh equation.
+The causes of least misfit also predict paths of 5 ship lengths, whose errors count as a seventh equation. How far noise
+makes them err is seen on the log with its noise once more.
 
-- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or the
-  one that does lowers the error of the paths by less than a share `WORTH`; or that error is noise; or the cause is
-  smaller than what a log has anyhow (a command that is a row late).
-- The cause of least misfit is named where each other one, its equals apart, is worse by `APART` standard errors, or by
-  the share `ALIKE` of its gain; those of its class that are not worse are `equals`. Else the answer is `cannot tell`,
-  and `equals` are the causes that remain.
+- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or those
+  that do so lower the error of the paths by less than a share `WORTH`; or that error is noise; or they are smaller than
+  what a log has anyhow (a command that is a row late).
+- Causes tie with that of least misfit where they are worse by less than `APART` standard errors, or the share `ALIKE`
+  of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
+  `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
 - `current by run` gains only what is beyond an unknown force of each run, as gusts are.
-- A second cause is looked for in the same way once the log is repaired from the first; then each is fitted beside the
-  other.
+- A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
+  naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
+  as well.
 """
 
 from __future__ import annotations
@@ -67,7 +69,7 @@ from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes
-from shipid.physics.signals import is_command, is_shaft, is_wrapped_angle
+from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
@@ -76,11 +78,13 @@ from shipid.vessel.load import Vessel
 Steps = NDArray[np.integer[Any]]
 NONE, UNCLEAR = "none", "cannot tell"
 LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
+CHANGES = 0.5  # share of the rows with a change: from there on a command is measured, below it is an order
+EVERY, BETWEEN = 2, 0.7  # steps from one evaluation of the physics to the next; over which an order is a mean
 MOST_PASSING = 200  # rows in which a ship of unknown length runs it, at most
-MOST_BUMPS = 400  # of a log: of a longer one parts are taken, evenly
+MOST_BUMPS = 160  # of a log: of a longer one parts are taken, evenly
 SMOOTH, NOISY = POINTS / 24, 0.03  # steps, of the smoothing before the forces; noise over signal from which it grows
 EXACT = 0.01  # of the size of the terms: what no resampled log says better
-AHEAD = 40  # steps of a predicted path: 2.5 ship lengths
+SHORTEST, AHEAD = 40, 80  # steps of a stretch; of a predicted path, 5 ship lengths where the runs are long enough
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_FORCES = 20  # evaluations of a fit of the forces alone
@@ -89,11 +93,15 @@ PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics
 MOST_SIZES = 2  # that a sentence names
 HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
-SIGN, SIGN_ROUNDS = 1.0, 4  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
+SIGN, SIGN_STEPS, SIGN_ROUNDS = (
+    1.0,
+    4,
+    4,
+)  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
 SURE, APART = 2.0, 2.0  # standard errors
+BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
 DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
-WORTH = {"sensor": 0.2, "command": 0.25, "coefficient": 0.3}  # share of the error of the path; a poor vessel has some
-WORTH_OTHER, WORTH_DISCRETE = 0.2, 0.05  # of another cause; of one without a size, as a wrong sign
+WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the paths; of a cause without a size, as a wrong sign
 STATES = ("u", "v", "r", "psi", "north", "east")
 
 
@@ -108,7 +116,7 @@ class Diagnosis:
         noise, that it explains.
     noise : mean error [m] of these paths by the noise of the log alone.
     next : the same of a second cause beside the first, if there is one; sizes are those beside each other.
-    misfits : key -> misfit on parts left out, less that of `none`.
+    misfits : key -> misfit on parts left out, less that of `none`; infinite where a cause is too small to matter.
     """
 
     cause: str
@@ -127,8 +135,7 @@ class Diagnosis:
     @property
     def how_far(self) -> str:
         """The error of the paths in words."""
-        noise = f"noise alone: {self.noise:.2g} m"
-        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average ({noise})"
+        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average (noise alone: {self.noise:.2g} m)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,13 +169,23 @@ class _Log:
         self.scales = Scales(length, max(speed, 1e-6 * length / usual), usual)
         self.width = max(min(LENGTHS * self.scales.passing, longest / 4), 8 * usual)
         self.step = self.width / POINTS
-        self.motion = self._resample(runs, stretches)
+        self.motion, self.smoothed = self._resample(runs, stretches), dict[str, tuple[Array, Array]]()
         self._cut(sum(float(np.ptp(rows["t"])) for _, rows in stretches))
         self.noise = self._noise(stretches, usual)
+        self.repair(self.motion)
+        random = np.random.default_rng(0)
+        noisy = {
+            name: self.motion.columns[name] + random.normal(0, size, len(self.motion.columns[name]))
+            for name, size in self.white.items()
+        }
+        self.plain_errors = self.path_errors(self.motion)
+        more = self.path_errors(self.motion.put(noisy)).mean() ** 2 - self.plain_errors.mean() ** 2
+        self.blind = float(np.hypot(max(more, 0.0) ** 0.5, self.blur))
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log."""
-        self.motion = motion
+        self.motion, self.smoothed = motion, {}
+        self.plain_residuals = self.residuals(motion)
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log."""
@@ -180,7 +197,7 @@ class _Log:
 
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path over 2.5 ship lengths by dead reckoning with u, v, r."""
-        columns, rows = self.states(motion), self.paths + np.arange(AHEAD + 1)[:, None]
+        columns, rows = self.states(motion), self.paths + np.arange(self.ahead + 1)[:, None]
         u, v, r = (columns[name][rows] for name in ("u", "v", "r"))
 
         def travelled(rate: NDArray[Any]) -> NDArray[Any]:
@@ -191,12 +208,11 @@ class _Log:
         return np.asarray(np.abs(place[1:] - place[0] - travelled((u + 1j * v) * np.exp(1j * heading))).mean(axis=0))
 
     def _resample(self, runs: Sequence[str], stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]]) -> Motion:
-        parts: list[dict[str, Array]] = []
-        places: list[int] = []
+        parts, places = list[dict[str, Array]](), list[int]()
         for run, rows in stretches:
             t = np.asarray(rows["t"], dtype=float)
             count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
-            if count > AHEAD and len(t) > 8:
+            if count > SHORTEST and len(t) > 8:
                 grid = t[0] + self.step * np.arange(count)
                 names = [name for name in rows if name not in ("run", "t", "flags")]
                 parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
@@ -205,33 +221,27 @@ class _Log:
             raise DataError(
                 f"no stretch is longer than {self.width:.3g} s, in which the ship runs {LENGTHS:g} lengths", path="runs"
             )
-        shared = set.intersection(*(set(part) for part in parts))
+        shared = sorted(set.intersection(*(set(part) for part in parts)))
         ends = np.cumsum([0, *(len(part["u"]) for part in parts)])
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in sorted(shared)}
-        rest = self.environment.keys() - columns.keys()
-        columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in sorted(rest)}
-        slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in shared}
+        rest = sorted(self.environment.keys() - columns.keys())
+        columns |= {name: np.full(int(ends[-1]), self.environment[name]) for name in rest}
+        slices = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
         return Motion(columns, np.array(self.numbers), slices, tuple(places), self.step)
 
     def _cut(self, duration: float) -> None:
         """Choose the bumps: index (W, POINTS + 1) of their steps, and the block and fold of each."""
-        begins, blocks, runs = list[Steps](), list[Steps](), list[Steps]()
-        first = 0
         every = max(STRIDE, int(STRIDE * np.ceil(duration / self.step / STRIDE / MOST_BUMPS)))
-        for part, run in zip(self.motion.stretches, self.motion.runs, strict=True):
-            here = np.arange(part.start, part.stop - POINTS - 1, every)
-            number = np.arange(len(here)) // BLOCK
-            begins.append(here)
-            blocks.append(number + first)
-            first += int(number.max(initial=-1)) + 1
-            runs.append(np.full(len(here), run))
-        begin = np.concatenate(begins)
+        here = [np.arange(part.start, part.stop - POINTS - 1, every) for part in self.motion.stretches]
+        begin, counts = np.concatenate(here), [len(places) for places in here]
         self.bumps = begin[:, None] + np.arange(POINTS + 1)
-        self.block = np.concatenate(blocks)
-        self.run = np.concatenate(runs)
+        self.block = np.cumsum(np.concatenate([np.arange(count) % BLOCK == 0 for count in counts])) - 1
+        self.run = np.repeat(self.motion.runs, counts)
         self.fold = (self.run if len(set(self.motion.runs)) >= FOLDS else self.block) % FOLDS
+        lengths = [part.stop - part.start for part in self.motion.stretches]
+        self.ahead = int(np.clip(np.median(lengths) // 3, SHORTEST, AHEAD))
         self.paths = np.concatenate(
-            [np.arange(part.start, part.stop - AHEAD, max(every, AHEAD // 2)) for part in self.motion.stretches]
+            [np.arange(part.start, part.stop - self.ahead, max(2 * every, SHORTEST)) for part in self.motion.stretches]
         ).astype(int)
         self.path_block = self.block[np.clip(np.searchsorted(begin, self.paths), 0, len(begin) - 1)]
         s = np.linspace(-1, 1, POINTS + 1)
@@ -240,41 +250,43 @@ class _Log:
         slope = slope - slope.mean()
         self.pull = slope / (slope @ t)
         self.worth = len(begin) * STRIDE / POINTS if every == STRIDE else float(len(begin))
-        psi = self.motion.columns["psi"][self.bumps[:, POINTS // 2]]
-        self.turn = np.exp(-1j * psi)
-        self.used: Steps = np.unique(self.bumps)
-        self.place = np.searchsorted(self.used, self.bumps)
+        self.turn = np.exp(-1j * self.motion.columns["psi"][self.bumps[:, POINTS // 2]])
+        self.used: Steps = np.unique(self.bumps[:, ::EVERY])
+        self.place = np.searchsorted(self.used, self.bumps[:, ::EVERY])
 
     def _noise(self, stretches: Sequence[tuple[str, Mapping[str, NDArray[Any]]]], usual: float) -> Array:
         """Standard deviation (6,) of each residual by the white noise of the log, and by what no log says better."""
-        share = min(usual / self.step, 1.0) ** 0.5
+        share = (usual / self.step) ** 0.5
         series = {name: [np.asarray(rows[name], dtype=float) for _, rows in stretches] for name in STATES}
         series["psi"] = [np.unwrap(values) for values in series["psi"]]
         u, v, r, psi, north, east = (share * np.median([*map(white_noise_of, series[name])]) for name in STATES)
         sizes = (np.sqrt(np.mean(self.motion.columns[name] ** 2)) for name in ("u", "v", "r"))
         rough = max(noise / max(size, 1e-12) for noise, size in zip((u, v, r), sizes, strict=True))
         self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
-        pulled, summed = float(np.linalg.norm(self.pull)), float(np.linalg.norm(self.phi))
+        pulled, summed = (float(np.linalg.norm(one)) for one in (self.pull, self.phi))
         speed, passing = self.scales.speed, self.scales.passing
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
         heading, fix = summed * speed * psi, max(north, east)
         self.blur = float(np.hypot(fix, 0.1 * EXACT * self.scales.length))
-        ahead = self.step * AHEAD
-        way = ahead / (12 * np.pi**0.5 * self.smooth) ** 0.5 * np.array([1, 1, speed, speed * ahead * 0.15**0.5])
-        self.blind = float(np.linalg.norm([2**0.5 * self.blur, *(way * [u, v, psi, r])]))
+        self.white = dict(zip(STATES, (u, v, r, psi, north, east), strict=True))
         turning = np.hypot(pulled * psi, summed * r)
         along, across = (np.hypot(pulled * fix, summed * one) for one in (u, v))
         noise = [pulled * u, pulled * v, pulled * r, turning, along, np.hypot(across, heading)]
         return np.asarray(np.hypot(noise, 0.1 * EXACT * terms))
 
     def states(self, motion: Motion) -> dict[str, Array]:
-        """Columns of the states, those of motion smoothed."""
+        """Columns of the states and orders, smoothed: motion by its noise, orders over the steps of the physics."""
         columns = dict(motion.columns)
-        for name in ("u", "v", "r", "psi"):
-            values = np.array(columns[name])
-            for part in motion.stretches:
-                values[part] = gaussian_filter1d(columns[name][part], self.smooth, mode="nearest")
-            columns[name] = values
+        for name in ("u", "v", "r", "psi", *self.commands):
+            given, known = columns[name], self.smoothed.get(name)
+            if known is None or known[0] is not given:
+                values = np.unwrap(given) if is_steering(name) else given
+                width = BETWEEN if name in self.commands else self.smooth
+                parts = [gaussian_filter1d(values[part], width, mode="nearest") for part in motion.stretches]
+                known = given, np.concatenate(parts)
+            if given is self.motion.columns[name]:
+                self.smoothed[name] = known
+            columns[name] = known[1]
         return columns | dict(body_velocities(columns))
 
     def residuals(self, motion: Motion) -> Array:
@@ -288,22 +300,28 @@ class _Log:
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
         return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
 
-    def estimate(self, cause: Cause, rounds: int = ROUNDS) -> _Fit:
-        """Fit a cause by Gauss-Newton from the start of least misfit; one that lowers nothing stays there."""
+    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: Array | None = None) -> _Fit:
+        """Fit a cause by Gauss-Newton from a size or the start of least misfit; one that lowers nothing stays."""
         trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
+            if len(theta) and not theta.any():
+                return self.motion, self.plain_residuals
             motion = cause.change(self.motion, theta)
             z = self.residuals(motion)
             if cause.scaled:
-                z[list(cause.scaled)] *= np.exp(theta[0])
+                z[list(cause.scaled)] *= np.exp(max(theta[0], 0.0))  # neither way makes less of an error
             return motion, z
 
-        begins = [np.zeros(len(trials)), *(np.array([begin]) for begin in cause.starts)]
-        theta, (motion, z) = min(((begin, change(begin)) for begin in begins), key=lambda one: self.misfit(one[1][1]))
-        J = np.zeros((len(theta), *z.shape))
+        begins = [np.zeros(len(trials)), *map(np.atleast_1d, cause.starts)] if begin is None else [begin]
+        theta, (motion, z) = min(((one, change(one)) for one in begins), key=lambda one: self.misfit(one[1][1]))
+        J, unit = np.zeros((len(theta), *z.shape)), np.eye(len(theta))
+        if cause.of_runs:  # a change of all runs at once: none feels the number of another
+            unit = np.repeat(np.eye(2), len(theta) // 2, axis=1)
         for _ in range(rounds if len(theta) else 0):
-            J = np.array([(change(theta + one)[1] - z) / one.sum() for one in np.diag(trials)])
+            J = np.array([(change(theta + one)[1] - z) / one.max() for one in unit * trials])
+            if cause.of_runs:
+                J = np.concatenate([one * (self.run == np.arange(len(theta) // 2)[:, None, None]) for one in J])
             step = np.clip(self._step(J, z, np.ones(z.shape[1], dtype=bool)), -20 * trials, 20 * trials)
             if cause.ratio and not cause.scaled:
                 step = np.clip(step, -MOST_RATIO - theta, MOST_RATIO - theta)
@@ -350,8 +368,7 @@ class _Log:
         bread = np.linalg.pinv(np.einsum("icw,jcw->ij", A, A), rcond=1e-12)
         of_block = self.block[:, None] == np.arange(int(self.block.max()) + 1)
         score = bread @ np.einsum("icw,cw->iw", A, e) @ of_block
-        covariance: Array = score @ score.T
-        return covariance
+        return np.asarray(score @ score.T)
 
     def misfit(self, z: Array) -> float:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
@@ -388,6 +405,7 @@ class _Log:
 class _VesselLog(_Log):
     """A log with the vessel that should have made it."""
 
+    _kept: tuple[Array, Array] | None = None
     plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
     def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str], environment: Mapping[str, float]) -> None:
@@ -397,17 +415,15 @@ class _VesselLog(_Log):
         self.length, self.commands = vessel.length, self.model.commands
         self.environment = {name: environment.get(name, 0.0) for name in self.model.environment}
         self.numbers = tuple(vessel.parameters.values())
-        missing = next((name for name in self.commands if name not in dataset.commands), None)
-        if missing is not None:
+        for missing in (name for name in self.commands if name not in dataset.commands):
             raise DataError(f"{vessel.name} needs this command; the data have none", path=missing)
         super().__init__(dataset, runs)
-        self.repair(self.motion)
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log, whose actuators and forces are kept."""
-        self.motion, self._kept = motion, None
-        memory = self.memory(motion)
-        self._kept = memory, np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        kept = self.memory(motion), self.forces(motion)
+        self.motion, self._kept = motion, kept
+        super().repair(motion)
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log or with the vessel."""
@@ -418,21 +434,22 @@ class _VesselLog(_Log):
         orders = {name: motion.columns[name] for name in self.commands}
         if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
             return self._kept[0]
-        result = np.zeros((len(self.model.memory), len(motion.columns["u"])))
-        for part in motion.stretches if self.model.memory else ():
-            given = {name: values[part] for name, values in orders.items()}
-            reached = memory_along(self.vessel, given, self.step * np.arange(part.stop - part.start)) or {}
-            result[:, part] = np.array([reached[name] for name in self.model.memory])
-        return result
+        reached = [
+            memory_along(self.vessel, {name: x[part] for name, x in orders.items()}, motion.step * np.arange(count))
+            or {}
+            for part, count in ((part, part.stop - part.start) for part in motion.stretches)
+        ]
+        series = [np.concatenate([one[name] for one in reached]) for name in self.model.memory]
+        return np.reshape(series, (len(series), len(motion.columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
-        names = ["u", "v", "r", *self.commands, *self.environment]
-        names += ["psi"] if any(motion.columns[name].any() for name in self.environment) else []
+        turned = any(motion.columns[name].any() for name in self.environment)
+        names = ["u", "v", "r", *self.commands, *self.environment, *["psi"] * turned]
         same = all(motion.columns[name] is self.motion.columns[name] for name in names)
         if self._kept is not None and same and motion.parameters is self.motion.parameters:
             return self._kept[1]
-        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ self.phi)
+        return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY]))
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
@@ -452,7 +469,7 @@ class _VesselLog(_Log):
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
         columns, at = self.states(motion), self.paths
-        rows = at + np.arange(AHEAD + 1)[:, None]
+        rows = at + np.arange(self.ahead + 1)[:, None]
         found = rollout_distances(
             self.vessel,
             dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
@@ -465,14 +482,19 @@ class _VesselLog(_Log):
             memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
         )
         far = LOST * self.scales.length
-        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / AHEAD, far)))
+        return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / self.ahead, far)))
 
 
 def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
-    """A column at equal steps: an order holds from its row on; motion is averaged over a step, or goes on smoothly."""
-    if is_command(name):
+    """A column at equal steps: motion is averaged over a step, or goes on smoothly.
+
+    A command that stays for some rows is an order, which holds from its row on, else it goes on evenly.
+    """
+    if is_command(name) and np.mean(np.diff(values) != 0) < CHANGES:
         last = np.searchsorted(t, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
         return np.asarray(values[np.clip(last, 0, len(t) - 1)])
+    if is_command(name):
+        return np.interp(grid, t, np.unwrap(values) if is_steering(name) else values)
     values = np.unwrap(values) if is_wrapped_angle(name) else values
     step = grid[1] - grid[0]
     if np.median(np.diff(t)) > 0.7 * step:
@@ -498,22 +520,6 @@ def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
     )
 
 
-def _likeliest_signs(astern: Array) -> Array:
-    """Signs (N,) of least misfit, where each change of the sign costs `SIGN` (Viterbi).
-
-    astern : (N,) by how much less the misfit is with -1.
-    """
-    cost, came = np.zeros(2), np.zeros((len(astern), 2), dtype=int)
-    for i, less in enumerate(astern):
-        came[i] = [int(cost[1] + SIGN < cost[0]), int(cost[1] <= cost[0] + SIGN)]
-        cost = np.minimum(cost, cost[::-1] + SIGN) - [0.0, less]
-    state, signs = int(np.argmin(cost)), np.ones(len(astern))
-    for i in range(len(astern) - 1, -1, -1):
-        signs[i] -= 2 * state
-        state = came[i, state]
-    return signs
-
-
 def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
     return motion.put({name: signs * motion.columns[name] for name in names})
 
@@ -523,25 +529,26 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
 
     They turn astern where u and r change as they do under shafts that turn astern.
     """
-    motion, every = log.motion, np.arange(len(log.motion.columns["u"]))
-    smooth, measured = log.states(motion), np.zeros((2, len(every)))
+    motion, count = log.motion, len(log.motion.columns["u"])
+    smooth, measured, every = log.states(motion), np.zeros((2, count)), np.arange(0, count, SIGN_STEPS)
     for part in motion.stretches:
-        rates = (np.gradient(gaussian_filter1d(smooth[name][part], SMOOTH), log.step) for name in ("u", "r"))
-        measured[:, part] = list(rates)
-    shafts = [name for name in filter(is_shaft, log.commands) if motion.columns[name].min() >= 0]
-    shafts = [name for name in shafts if np.ptp(motion.columns[name]) > 0]
+        smoother = (gaussian_filter1d(smooth[name][part], SMOOTH) for name in ("u", "r"))
+        measured[:, part] = [np.gradient(values, log.step) for values in smoother]
+    turning = {name: motion.columns[name] for name in filter(is_shaft, log.commands)}
+    shafts = [name for name, values in turning.items() if 0 <= values.min() < values.max()]
     for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
         ahead, astern = (
-            (measured - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2 for sign in (1, -1)
+            (measured[:, every] - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2
+            for sign in (1, -1)
         )
-        signs = np.ones(len(every))
+        signs = np.ones(count)
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
-            level = 1 / log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2], None]
-            signs = _likeliest_signs(((ahead - astern) / level**2).sum(axis=0) / POINTS)
+            weight = log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2]]
+            less = gaussian_filter1d(weight**2 @ (ahead - astern), SIGN)
+            signs = np.repeat(np.where(less > 0, -1.0, 1.0), SIGN_STEPS)[:count]
         if (signs < 0).any():
-            together = f" / with {' '.join(names[1:])}" * (len(names) > 1)
             yield Cause(
-                f"command {names[0]} unsigned{together}",
+                " ".join([f"command {names[0]} unsigned", *(["/ with", *names[1:]] if len(names) > 1 else [])]),
                 partial(_put_signs, names, signs),
                 repair=f"{' and '.join(names)} without a sign: give the column that says ahead or astern",
                 equals=tuple(f"command {name} unsigned" for name in shafts),
@@ -585,57 +592,73 @@ def diagnose(
     names = list(dataset.runs if runs is None else runs)
     log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
     causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
-    first, fit = _judge(log, causes)
+    motion, whole = log.motion, log.beyond_noise(log.plain_errors)
+    first, fit = _judge(log, causes, whole)
     if fit is None:
         return first
-    motion = log.motion
     log.repair(fit.motion)
-    second, other = _judge(log, [one for one in causes if one.key.partition(" / ")[0] != first.cause])
-    if other is not None:
-        log.repair(other.cause.change(motion, other.theta))  # each beside the other
-        fit = log.estimate(fit.cause)
-        log.repair(fit.cause.change(motion, fit.theta))
-        other = log.estimate(other.cause)
-        first, second = _describe(first, fit), _describe(second, other)
-    return replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
+    second, other = _judge(log, [one for one in causes if one.name != fit.cause.name], whole)
+    rivals = [name for name in first.equals if first.cause == UNCLEAR and name != fit.cause.name]
+    if rivals and all(_gain_of(second, name) > BOTH * _gain_of(first, name) for name in rivals):  # both are there
+        first = _describe(replace(first, cause=fit.cause.name, equals=()), fit)
+    if other is not None and second.cause != NONE:  # what was best alone may not be so beside the other
+        log.repair(other.cause.change(motion, other.theta))
+        first, fit = _judge(log, [one for one in causes if one.name != other.cause.name], whole)
+        log.repair(motion if fit is None else fit.cause.change(motion, fit.theta))
+        second = second if second.cause == UNCLEAR else _describe(second, log.estimate(other.cause))
+        if first.cause in (NONE, UNCLEAR):
+            first, second = second, first
+    both = replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
+    return first if first.cause == NONE else both
 
 
-def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
-    """The best of all causes as a diagnosis, and its fit where it is named."""
-    base = log.residuals(log.motion)
+def _gain_of(result: Diagnosis, name: str) -> float:
+    return max(-misfit for key, misfit in (result.misfits or {}).items() if key.partition(" / ")[0] == name)
+
+
+def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis, _Fit | None]:
+    """The best of all causes as a diagnosis, and its fit where it explains more than chance would.
+
+    whole : error [m] of paths by the log as it was given, beyond its noise.
+    """
+    base = log.plain_residuals
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
-    fits = first | {key: log.estimate(first[key].cause) for key in near}
-    forces = log.gain_of_forces(base)
-    cost = {cause.key: cause.cost + forces * cause.of_runs for cause in causes}
+    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
+    cost = {
+        key: np.inf if fit.cause.trial and np.linalg.norm(fit.theta) < fit.cause.least else fit.cause.cost
+        for key, fit in fits.items()
+    }
+    cost |= {cause.key: cost[cause.key] + log.gain_of_forces(base) for cause in causes if cause.of_runs}
     misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
     misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
-    best = fits[order[0]]
-    cause, theta = best.cause, best.theta
+    before, missed = log.beyond_noise(plain[1]), float(plain[1].mean())
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
-    ahead, missed = log.step * AHEAD, float(plain[1].mean())
-    share = 1 - log.beyond_noise(seen[order[0]][1]) / log.beyond_noise(plain[1])
+    left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
+    worth = {key: min(1 - x / before, 1 - x / whole, 1.5 * (before - x) / whole) for key, x in left.items()}
+    share, ahead = 1 - left[order[0]] / before, log.step * log.ahead
     result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    least = WORTH.get(cause.key.partition(" ")[0], WORTH_OTHER) if cause.trial else WORTH_DISCRETE
-    shown = gain > min(SURE * error, DECISIVE) and (share > least or gain > log.plain * log.worth)
-    if missed < log.blur or not shown or (cause.trial and np.linalg.norm(theta) < cause.least):
+    if missed < log.blur or gain < min(SURE * error, DECISIVE):
         return result, None
-    behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order[1:]}
-    tied = [key for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
-    near = list(dict.fromkeys(key.partition(" / ")[0] for key in tied))
-    name = cause.key.partition(" / ")[0]
-    if set(near) - {name, *cause.equals}:
-        alike = (name, *(key for key in near if key != name))
-        sentence = f"{result.how_far}: {' or '.join(alike)} would explain that, and the log does not tell which"
-        return replace(result, cause=UNCLEAR, equals=alike, sentence=_with_remedy(sentence, cause.tells)), None
-    unfitted = [key for key in cause.equals if key not in fits]
-    equals = tuple(key for key in dict.fromkeys([*near, *unfitted]) if key != name)
-    return _describe(replace(result, cause=name, equals=equals), best), best
+    behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
+    tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
+    told = [
+        one for one in tied if worth[one.key] > (WORTH if one.trial else WORTH_DISCRETE) or gain > log.plain * log.worth
+    ]
+    if not told:
+        return result, fits[order[0]] if gain > DECISIVE else None
+    cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
+    result = replace(result, share=1 - left[cause.key] / before)
+    if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):
+        sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
+        return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=sentence + cause.remedy), best
+    equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in fits)]))
+    return _describe(replace(result, cause=cause.name, equals=equals), best), best
 
 
 def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
@@ -645,15 +668,10 @@ def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
     interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
     words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
+    sized, unit = f"{' = ' * bool(words)}{', '.join(words)}", cause.unit.strip("1")
     sentence = (
-        f"{result.how_far}: {result.cause}{' = ' * bool(words)}{', '.join(words)}{' ' * bool(cause.unit.strip('1'))}"
+        f"{result.how_far}: {result.cause}{sized}{' ' * bool(unit)}{unit} explains {percent_text(result.share)} of "
+        f"what is no noise; {' '.join(repair.split())}"
     )
-    sentence += (
-        f"{cause.unit.strip('1')} explains {percent_text(result.share)} of what is no noise; {' '.join(repair.split())}"
-    )
-    sentence = _with_remedy(f"{sentence}; {' or '.join(equals)} would look alike", cause.tells) if equals else sentence
+    sentence += f"; {' or '.join(equals)} would look alike{cause.remedy}" if equals else ""
     return replace(result, size=sizes, interval=interval, repair=repair, sentence=sentence)
-
-
-def _with_remedy(sentence: str, tells: str) -> str:
-    return f"{sentence}: to tell them apart, {tells}" if tells else sentence

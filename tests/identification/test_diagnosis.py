@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.identification.diagnosis import NONE, UNCLEAR, diagnose
 from shipid.vessel.load import load_vessel
+from tests.identification.faulty_logs import diagnose_log, draw_faulty_log, draw_ship
 from tests.identification.trials import changed, noisy, trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -34,11 +36,17 @@ def sides(f: Frame) -> dict[str, np.ndarray]:
     return {a: f[b] for pair in pairs for a, b in (pair, pair[::-1])}
 
 
+def course(f: Frame) -> dict[str, np.ndarray]:
+    """All that a receiver of satellites says of the motion: the drift is lost."""
+    return {"psi": f["psi"] + np.arctan2(f["v"], f["u"]), "u": np.hypot(f["u"], f["v"]), "v": 0 * f["v"]}
+
+
 FAULTS: dict[str, tuple[Callable[[Frame], dict[str, np.ndarray]], float | None]] = {
     "sensor psi bias": (lambda f: {"psi": f["psi"] + 0.08}, 0.08),
     "sensor r bias": (lambda f: {"r": f["r"] + 0.02}, 0.02),
     "sensor u scale": (lambda f: {"u": 1.1 * f["u"]}, 1.1),
     "sensor v sign": (lambda f: {"v": -f["v"]}, None),
+    "heading is course": (course, None),
     "lever arm position and velocity": (lambda f: moved(f, 9.0, True), 9.0),
     "lever arm position": (lambda f: moved(f, 9.0, False), 9.0),
     "command port.alpha zero": (lambda f: {"port.alpha": f["port.alpha"] + 0.2}, 0.2),
@@ -58,6 +66,23 @@ def test_a_fault_is_named_with_its_size(key: str) -> None:
     if size is not None and found.cause == key:
         assert found.size[0] == pytest.approx(size, rel=0.15)
         assert found.interval[0][0] <= found.size[0] <= found.interval[0][1]
+
+
+def test_two_faults_are_named_that_hide_each_other() -> None:
+    frame = log_of(1).frame
+    both = FAULTS["heading is course"][0](frame) | FAULTS["command port.alpha zero"][0](frame)
+    found = diagnose(SHIP, changed(log_of(1), **{name: np.asarray(x) for name, x in both.items()}))
+    assert found.next is not None
+    assert {found.cause, found.next.cause} == {"heading is course", "command port.alpha zero"}
+
+
+def test_causes_of_one_class_are_no_rivals(tmp_path: Path) -> None:
+    """A factor of the helm and one of the force of the rudder are one answer, whichever of the two leads."""
+    log = draw_faulty_log(30101, 22, draw_ship(6, 30101), 1)
+    assert log.causes == ("rudder.factor",)
+    causes, equals = diagnose_log(log, tmp_path)
+    assert {"command rudder.delta scale", "coefficient rudder"} <= {*causes, *equals}
+    assert UNCLEAR not in causes
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -9,13 +9,12 @@ from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.identification import residuals
 from shipid.identification.residuals import Predictions, build_problem, predict_residuals
-from shipid.identification.settings import Identify
+from shipid.identification.settings import NUISANCES, Identify
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED, variety
 from tests.identification.trials import trials
 
-ALL = ["initial_state", "current", "thrust_scale", "latency", "heading_bias", "velocity_bias", "lever_arm"]
 EVERY = {"u": 0.1, "v": 0.1, "r": 0.003, "psi": 0.02, "position": 1.0}
 #: structure -> what is free in it
 CASES = {
@@ -31,7 +30,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_slopes_are_differences(name: str) -> None:
     vessel = variety()[name] if name in PATCHED else load_vessel(name)
-    nuisance = [key for key in ALL if key != "thrust_scale" or any("k_T" in path for path in vessel.parameters)]
+    nuisance = [key for key in NUISANCES if key != "thrust_scale" or any("k_T" in path for path in vessel.parameters)]
     slow = 0.2 if name == "kvlcc2-l7" else 1.0
     dataset = trials(vessel, runs=2, steps=12, step=slow)
     wanted = Identify(parameters=CASES[name], weights=EVERY, nuisance=nuisance, horizon=0, step=slow)

@@ -195,23 +195,27 @@ def test_what_differs_by_run_is_identified() -> None:
 
 def test_faults_of_the_log_are_identified() -> None:
     runs, steps, rng = 4, 60, np.random.default_rng(9)
-    dataset = trials(SHIP, runs, steps)
     each = np.repeat(np.arange(runs), steps + 1)
     bias, arm = rng.uniform(-0.05, 0.05, runs), rng.uniform(-4, 4, runs)
     slip = rng.uniform(-0.1, 0.1, (2, runs))
+    scale, turning, zero = rng.uniform(0.9, 1.1, runs), rng.uniform(-0.01, 0.01, runs), rng.uniform(-0.05, 0.05, runs)
+    given = orders(SHIP, runs, steps, 1)
+    dataset = trials(SHIP, runs, steps, true_commands={k: x - zero * k.endswith("alpha") for k, x in given.items()})
     frame = dataset.frame
     b, x = bias[each], arm[each]
     across = frame["v"] + x * frame["r"]
     log = changed(
         dataset,
         psi=frame["psi"] + b,
-        u=np.cos(b) * frame["u"] + np.sin(b) * across + slip[0][each],
-        v=np.cos(b) * across - np.sin(b) * frame["u"] + slip[1][each],
+        u=scale[each] * (np.cos(b) * frame["u"] + np.sin(b) * across) + slip[0][each],
+        v=scale[each] * (np.cos(b) * across - np.sin(b) * frame["u"]) + slip[1][each],
+        r=frame["r"] + turning[each],
         north=frame["north"] + x * np.cos(frame["psi"]),
         east=frame["east"] + x * np.sin(frame["psi"]),
     )
     wanted = settings(
-        nuisance={"heading_bias": 0.1, "velocity_bias": 0.5, "lever_arm": 10.0},
+        nuisance={"heading_bias": 0.1, "velocity_bias": 0.5, "lever_arm": 10.0}
+        | {"velocity_scale": 0.2, "rate_bias": 0.1, "helm_zero": 0.1},
         weights={"u": 1e-4, "v": 1e-4, "r": 1e-5, "position": 1e-2},
     )
     solution = identify(SHIP, log, log.runs, wanted, start=dict.fromkeys(FEW, 0.9))
@@ -222,6 +226,9 @@ def test_faults_of_the_log_are_identified() -> None:
         ("lever_arm", arm),
         ("velocity_bias_u", slip[0]),
         ("velocity_bias_v", slip[1]),
+        ("velocity_scale", scale),
+        ("rate_bias", turning),
+        ("helm_zero", zero),
     ):
         assert np.allclose([solution.nuisances[run][name] for run in log.runs], truth, atol=5e-3)
 

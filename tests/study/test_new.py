@@ -120,7 +120,9 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
     assert document["split"]["test"] == ["zz 3"] or document["split"]["test"] == ["zz 4"]
     assert document["prediction"]["ahead"] == 19  # 2.5 x 33.9 m / 4.35 m/s
     assert "zigzag 8" in document["description"]
-    assert draft.warnings == ["R/V Gunnerus, 33.9 m: V_w, beta_w not measured, assumed 0"]
+    first, *others = draft.warnings
+    assert first == "R/V Gunnerus, 33.9 m: V_w, beta_w not measured, assumed 0"
+    assert all("paths over" in one for one in others)  # curves that no ship sailed disagree with its physics
     reasons = {choice.path for choice in draft.choices if not choice.why}
     assert reasons <= {"question"}
 
