@@ -354,8 +354,8 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         _take_servo(state, steers, turn[steers], used)
         steered = True
     drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
-    if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
-        alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
+    alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
+    if drives and (push[drives] > SETTINGS.seen or len(alike) > 1 or _are_pulses(state.columns[drives])):
         zero, why = _neutral_value(state, drives)
         words = (
             f"more of {' and '.join(map(repr, alike))} drives the ship ahead. Of which shaft speed is a value of 1? "

@@ -104,7 +104,7 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             repair: dict[str, Any] = {"kind": "lever_arm", "x": round(size[0], 2), "y": round(size[1], 2)}
             words = f"{size[0]:+.1f} m forward and {size[1]:+.1f} m to starboard of the velocities'"
             _find_cause(state, "lever arm", f"positions are of a point {words}", found, repair | {"moves": "position"})
-        elif key == "sensor r scale":
+        elif key == "sensor r scale" and state.r is not None:
             sentence = f"the heading is {1 / size[0]:.4f} times the integral of the yaw rate"
             repair = {"kind": "scale", "columns": ["r"], "factor": round(1 / size[0], 4)}
             _find_cause(state, "factor", sentence, found, repair)

@@ -148,7 +148,10 @@ def _ask_about_names(state: State, best: MotionReading) -> None:
     if is_magnetic(pose.heading):
         words = f"{pose.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
         state.ask(("psi", "v"), f"{words} A `heading_offset` is one for all courses")
-    if pose.misfit > SETTINGS.poor and not state.numbered:
+    shown = (
+        best.velocity is not None and best.velocity.fit.left < SETTINGS.left
+    )  # a ship that drifts keeps to no heading
+    if pose.misfit > SETTINGS.poor and not shown and not state.numbered:
         words = f"course and heading agree badly (misfit {pose.misfit:.2f}): are {first!r}, {second!r} the position"
         state.ask(("psi", "north", "east", "u", "v", "r"), f"{words} and {pose.heading!r} the heading?")
     lengths = [name for name in (first, second) if LENGTHS.search(name)]
