@@ -70,12 +70,15 @@ def _ask_about_exchange(state: State, edges: list[int], parts: list[Windows]) ->
     """Ask where the track of a file keeps to the heading, and in others to the course."""
     psi = next(one for one in state.suggestions if one.name == "psi")
     middle, track = (state.chosen.first + state.chosen.last) // 2, state.chosen.change(state.position)
-    for name in (name for name in state.all_called("course") if name != psi.source):
+    for name in dict.fromkeys([*state.all_called("course"), *state.all_called("psi")]):
+        if name == psi.source:
+            continue
         turn = to_si(unit_in_name(name, "rad") or psi.unit, "psi")
         ways = np.exp(1j * np.stack([state.psi, turn * state.columns[name]])[:, middle])
-        off = np.array([np.median(np.abs(np.angle(track[part] * np.conj(ways[:, part]))), axis=1) for part in parts])
+        away = np.abs(np.angle(track * np.conj(ways)))
+        off = np.array([np.median(away[:, one], axis=1) if one.sum() >= FEWEST else (1.0, 1.0) for one in parts])
         odd = off[:, 0] < 0.5 * off[:, 1]
-        if 0 < odd.sum() < len(parts):
+        if odd.any() and np.any(off[:, 1] < 0.5 * off[:, 0]):
             place = _place_of_parts(state, edges, np.flatnonzero(odd).tolist(), True)
             words = f"{place} the track keeps to {psi.source!r}, in the others to {name!r}: are they exchanged there"
             state.ask(("psi", "course", "u", "v", "r"), f"{words}? Then import it alone")
