@@ -19,6 +19,7 @@ from shipid.physics.signals import is_command, is_steering, signal_of
 Windows = NDArray[np.bool_]
 STRETCHES, FEWEST = 10, 20  # of one log; windows of a file or stretch that decides, at least
 SCALED = 0.005  # share of a motion that one scale leaves, at least, where there are two
+APART = np.radians(1.0)  # by which the track keeps to a heading more than to a course, at least
 UNDER_WAY = 0.4  # of the larger speeds: below, thrust turns a ship as much as an angle does
 REMEDY = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
 
@@ -77,8 +78,8 @@ def _ask_about_exchange(state: State, edges: list[int], parts: list[Windows]) ->
         ways = np.exp(1j * np.stack([state.psi, turn * state.columns[name]])[:, middle])
         away = np.abs(np.angle(track * np.conj(ways)))
         off = np.array([np.median(away[:, one], axis=1) if one.sum() >= FEWEST else (1.0, 1.0) for one in parts])
-        odd = off[:, 0] < 0.5 * off[:, 1]
-        if odd.any() and np.any(off[:, 1] < 0.5 * off[:, 0]):
+        odd = off[:, 0] < 0.5 * off[:, 1] - APART
+        if odd.any() and np.any(off[:, 1] < 0.5 * off[:, 0] + APART * (name in state.all_called("course"))):
             place = _place_of_parts(state, edges, np.flatnonzero(odd).tolist(), True)
             words = f"{place} the track keeps to {psi.source!r}, in the others to {name!r}: are they exchanged there"
             state.ask(("psi", "course", "u", "v", "r"), f"{words}? Then import it alone")
