@@ -14,12 +14,15 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import (
+    ORDERS,
+    SOURCES,
     is_electrical,
     is_engine,
     is_order,
     meaning_scores,
     name_parts,
     number_in_name,
+    side_in_name,
     units_in_name,
 )
 from shipid.logs.mapping import UNITS, to_si
@@ -355,7 +358,8 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         steered = True
     drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
     alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
-    if drives and (push[drives] > SETTINGS.seen or len(alike) > 1 or _are_pulses(state.columns[drives])):
+    seen = bool(drives) and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives]))
+    if seen or (drives and _is_plain_actuator(drives)):
         zero, why = _neutral_value(state, drives)
         words = (
             f"more of {' and '.join(map(repr, alike))} drives the ship ahead. Of which shaft speed is a value of 1? "
@@ -461,6 +465,12 @@ def _says_actuator(state: State, name: str) -> bool:
     """Whether a name says an order, a throttle or per cent, or its numbers are pulses."""
     said = is_order(name) or bool(OF_ACTUATORS & {*name_parts(name)}) or unit_in_name(name, "rev/s") == "%"
     return said or _are_pulses(state.columns[name])
+
+
+def _is_plain_actuator(name: str) -> bool:
+    """Whether a name says an actuator, its side, its number, an order and nothing else: no `motor temp`."""
+    aside = OF_ACTUATORS | ORDERS | SOURCES
+    return all(part in aside or part.isdigit() or side_in_name(f"x {part}") for part in name_parts(name))
 
 
 def _may_be_actuator(state: State, name: str) -> bool:

@@ -100,10 +100,10 @@ PHRASES: dict[str, str] = {
     "course": "course, course over ground, course ground, heading over ground, heading ground, cog, crs, track, "
     "track angle, track over ground, track ground, chi, kueg, kug, kog, tmg, course og, course made good, track made "
     "good, beholden course, heading efectivo",
-    "u": "u, surge, surge speed, long speed, fwd speed, ahead speed, x speed, u speed, v x, v long, v fwd, v surge, "
-    "nu 1, x dot, u body, linear x",
-    "v": "v, sway, sway speed, trans speed, lat speed, drift speed, starboard speed, stbd speed, y speed, v speed, v "
-    "y, v trans, v lat, v stbd, v sway, nu 2, y dot, v body, linear y",
+    "u": "u, vx, surge, surge speed, long speed, fwd speed, ahead speed, x speed, u speed, v x, v long, v fwd, v "
+    "surge, nu 1, x dot, u body, linear x",
+    "v": "v, vy, sway, sway speed, trans speed, lat speed, drift speed, starboard speed, stbd speed, y speed, v "
+    "speed, v y, v trans, v lat, v stbd, v sway, nu 2, y dot, v body, linear y",
     "velocity_north": "vn, vx, v n, v north, north speed, n speed, ned n speed, enu y speed, x speed, v x, x dot",
     "velocity_east": "ve, vy, v e, v east, east speed, est speed, e speed, ned e speed, enu x speed, y speed, v y, y "
     "dot",

@@ -232,3 +232,20 @@ def test_pulses_are_drafted_by_what_the_ship_does_after_them(names: tuple[str, s
     assert angle.extra["offset"] == pytest.approx(-sense * 1500.0 * 45.0 / 400.0)
     assert described(state)["propeller.n"][0] == names[1]
     assert any("dead band" in one.sentence for one in state.questions)
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("thrust_cmd", True),
+        ("motor_cmd_left", True),
+        ("throttle 1", True),
+        ("motor_temp", False),
+        ("engine load", False),
+    ],
+)
+def test_an_order_of_an_actuator_is_asked_though_its_effect_is_not_seen(name: str, taken: bool) -> None:
+    """The order of the only screw of a boat was left out without a word where wind hid what it does."""
+    state = chosen({name: np.random.default_rng(4).uniform(0.0, 1.0, len(T))})
+    assert [one.source for one in state.suggestions if one.name.endswith(".n")] == [name] * taken
+    assert any(repr(name) in one.sentence and "n" in one.about for one in state.questions) == taken
