@@ -33,6 +33,7 @@ TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
 FASTEST, GEARED = 200.0, 5.0  # rev/s: no shaft is faster; an engine that is faster usually has a gear
 PULSES = (700.0, 2300.0)  # us: what a servo takes is about 1500, from 1000 to 2000
+OFTEN_ASTERN = 0.01  # share of the windows, from which a shaft without a sense is asked about
 NOISE = 0.02  # of the range of an order: less is no motion of it
 SERVO, OFF_SERVO = 1500.0, 100.0  # us: its middle, and how far a stopped screw may be from it
 SHARES = {
@@ -249,6 +250,9 @@ def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict
         if not tunnel and not azimuth and _runs_astern(state, name):
             extra = {**extra, "sign": -1}
             why += "; negative while the ship goes ahead"
+        if not tunnel and not state.astern and _hides_astern(state, name):
+            words = f"{name!r} is never negative, but turns while the ship goes astern: which column says its sense"
+            state.ask(("n",), f"{words}? Without one its turns astern are taken as ahead")
     state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
@@ -313,10 +317,23 @@ def _hard_over(state: State) -> float:
 
 def _runs_astern(state: State, name: str) -> bool:
     """Whether a shaft is negative nearly always when the ship goes ahead."""
+    ahead, shaft = _way_and_shaft(state, name)
+    fast = ahead > 0.3
+    return bool(fast.any() and np.mean(shaft[fast] < 0) > SETTINGS.astern)
+
+
+def _hides_astern(state: State, name: str) -> bool:
+    """Whether a shaft that is never negative turns while the ship goes astern."""
+    ahead, shaft = _way_and_shaft(state, name)
+    turning = shaft > 0.2 * float(np.max(shaft, initial=0.0))
+    return bool(state.columns[name].min() >= 0.0 and np.mean(turning & (ahead < -0.1)) > OFTEN_ASTERN)
+
+
+def _way_and_shaft(state: State, name: str) -> tuple[Array, Array]:
+    """The way ahead over each window, as a share of the usual way, and the shaft in its middle, (W,) each."""
     middle = (state.chosen.first + state.chosen.last) // 2
     ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
-    fast = ahead > 0.3 * float(np.percentile(np.abs(ahead), 90))
-    return bool(fast.any() and np.mean(state.columns[name][middle[fast]] < 0) > SETTINGS.astern)
+    return ahead / max(float(np.percentile(np.abs(ahead), 90)), 1e-12), state.columns[name][middle]
 
 
 # --- actuators whose quantity no name says ---
