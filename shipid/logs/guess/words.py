@@ -117,8 +117,8 @@ PHRASES: dict[str, str] = {
     "beta_w": "wind direction, wind angle, wind from, twd, twa, awa, beta w, gamma w",
     "delta": "delta, rudder, rsa, helm, dr, d r, delta r, flap angle, steering angle, steering gear angle",
     "alpha": "alpha, alpha t, azimuth, pod, outboard, z drive, thruster angle, thruster direction, thruster "
-    "orientation, thrust angle, nozzle angle, drive angle, stern drive angle, sterndrive angle, zdrive angle, jet "
-    "angle, waterjet angle",
+    "orientation, tilt angle, thrust angle, nozzle angle, drive angle, stern drive angle, sterndrive angle, zdrive "
+    "angle, jet angle, waterjet angle",
     "n": "n, rpm, shaft, propeller, engine, shaft speed, propeller speed, engine speed, motor speed, thruster speed, "
     "rotation speed, turn number, n p, erpm, e rpm, electrical rpm, electric rpm, elec rpm",
     "pitch": "cpp, propeller pitch, propeller cpp, propeller pas, pitch ratio, p d",
