@@ -8,16 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State
+from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.defects import clock_text
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.search import senses_of_angle
 from shipid.logs.guess.settings import SETTINGS
+from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_command, is_steering, signal_of
 
 Windows = NDArray[np.bool_]
 STRETCHES, FEWEST = 10, 20  # of one log; windows of a file or stretch that decides, at least
 SCALED = 0.005  # share of a motion that one scale leaves, at least, where there are two
+APART = np.radians(1.0)  # by which the track keeps to a heading more than to a course, at least
 UNDER_WAY = 0.4  # of the larger speeds: below, thrust turns a ship as much as an angle does
 REMEDY = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
 
@@ -32,6 +34,8 @@ def ask_for_changes(state: State, pause: float) -> None:
     parts = [(middle >= first) & (middle < end) for first, end in pairwise(edges)]
     _ask_about_scales(state, edges, parts, files)
     _ask_about_senses(state, edges, parts, files)
+    if files:
+        _ask_about_exchange(state, edges, parts)
     track, heading = state.chosen.change(state.position), np.exp(1j * state.psi[middle])
     psi = next(one.source for one in state.suggestions if one.name == "psi") if files else ""
     for number, part in enumerate(parts if files and not state.astern else ()):
@@ -61,6 +65,24 @@ def _ask_about_scales(state: State, edges: list[int], parts: list[Windows], file
             place = _place_of_parts(state, edges, odd, files)
             words = f"has {' and '.join(map(repr, columns))} another unit or sign {place}? There the motion is"
             state.ask(about, f"{words} {ratio:.3g} times as much, beside its integral, as elsewhere. {REMEDY}")
+
+
+def _ask_about_exchange(state: State, edges: list[int], parts: list[Windows]) -> None:
+    """Ask where the track of a file keeps to the heading, and in others to the course."""
+    psi = next(one for one in state.suggestions if one.name == "psi")
+    middle, track = (state.chosen.first + state.chosen.last) // 2, state.chosen.change(state.position)
+    for name in dict.fromkeys([*state.all_called("course"), *state.all_called("psi")]):
+        if name == psi.source:
+            continue
+        turn = to_si(unit_in_name(name, "rad") or psi.unit, "psi")
+        ways = np.exp(1j * np.stack([state.psi, turn * state.columns[name]])[:, middle])
+        away = np.abs(np.angle(track * np.conj(ways)))
+        off = np.array([np.median(away[:, one], axis=1) if one.sum() >= FEWEST else (1.0, 1.0) for one in parts])
+        odd = off[:, 0] < 0.5 * off[:, 1] - APART
+        if odd.any() and np.any(off[:, 1] < 0.5 * off[:, 0] + APART * (name in state.all_called("course"))):
+            place = _place_of_parts(state, edges, np.flatnonzero(odd).tolist(), True)
+            words = f"{place} the track keeps to {psi.source!r}, in the others to {name!r}: are they exchanged there"
+            state.ask(("psi", "course", "u", "v", "r"), f"{words}? Then import it alone")
 
 
 def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[int], float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import FIRST_DATED_TIME, Array
+from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.dates import (
     DAY,
@@ -36,7 +35,7 @@ from shipid.logs.dates import (
     rollover_words,
     time_texts,
 )
-from shipid.logs.guess.words import NO_VALUE, is_run, name_parts, units_in_name
+from shipid.logs.guess.words import is_run, name_parts, units_in_name
 from shipid.logs.instants import SHORTEST, clock_rounding, even_clock, rows_repeated
 from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, clock_seconds, since_midnight, source_columns, to_si
 
@@ -81,12 +80,7 @@ FINE = {"ns": 1.5e7, "us": 1.5e4}
 DATES = {unit: (epoch + 7305.0, epoch + 29220.0) for unit, epoch in EPOCHS.items()}
 """Unit of a clock in days -> its numbers of 1990 and 2050. Those of Excel from 2031 and
 modified Julian dates to 2008 are the same numbers."""
-GPS, OF_GPS = 315_964_800, frozenset("gps gnss gpst".split())
-"""Seconds from 1970 to 6 January 1980, from which GPS counts, and words of a clock that may."""
-OF_1970 = frozenset("unix epoch posix utc".split())  # words of a clock from 1970
-LEAP, LEAPS = 1_483_228_800, 18  # s since 1970 (UTC): from 2017 on GPS is so many seconds ahead of UTC
 RECENT, LATEST = (9.46e8, 2.53e9), 5e9  # s since 1970: from 2000 to 2050, and of no log
-OF_1904 = 2_082_844_800  # s from 1904, from which LabVIEW counts, to 1970
 SHORT_DAY = 1e-3  # d, 86 s: rows of a log are closer; in seconds no log of a ship has a thousand rows in one
 NO_CLOCK_WORDS = frozenset(["delay", "constant", "zone", "diff", "delta", "step"])
 
@@ -209,65 +203,54 @@ def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | N
 
 
 def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
+    """The first clock that rises: of two columns, of texts, of fields, of numbers called so, of any other number."""
     if (pair := _in_pair(columns)) is not None:
         return pair
-    finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
-    rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
-    called = [name for name in columns if is_clock(name)]
+    rising = [name for name, values in columns.items() if len(values) and np.all(np.diff(values) > 0)]
+    dates, tried = _date_column(table, columns), dict[str, Array]()
     texts = [name for name in map(str, table.columns) if name not in columns and name]
-    times: dict[str, Array] = {}
     for name in sorted(texts, key=lambda name: not is_clock(name)):
         column = column_called(table, name)
         of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
-        whole = len(of_day) and of_day.all()
-        if whole and (with_date := _with_date(table, columns, name)):
-            return with_date
+        if len(of_day) and of_day.all() and (clock := _with_date(table, columns, name)):
+            return clock
         since = parse_dates(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
-        times[name] = since
         if clock := _rising_clock({"from": name, "unit": "date"}, since):
             return clock
-        called += [name] if is_clock(name) or np.isfinite(since).all() else []
-    in_columns = _in_columns(table, columns, _date_column(table, columns))
-    if in_columns is not None:
-        return in_columns
-    if not any(name in called for name in rising):  # another column that happens to rise is no clock then
-        for name, since in times.items():
-            if np.isfinite(since).all() and np.any(np.diff(since) < 0):
-                raise DataError(f"no column can be the clock: {name!r} {_clock_fault(since)}", file=file)
-        dates = _date_column(table, columns)
-        called = [name for name in called if name != dates] or called  # that repeat: the times beside them are at fault
-        for name in called if dates is not None else ():
-            if name in texts:
-                fault = _unreadable_time(table, name, times[name]) or _clock_fault(times[name])
-                raise DataError(f"no column can be the clock: {name!r} {fault}", file=file)
-    faulty = [name for name in called if name not in rising and _nearly_rises({**times, **columns}[name])]
-    counters = [name for name in rising if np.all(np.diff(columns[name]) == 1.0) and columns[name][0] in (0.0, 1.0)]
-    others = [] if faulty else [name for name in rising if name not in counters]  # a total rises, too
-    candidates = [name for name in rising if name in called] or others
-    unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
-    rounded = [name for name in called or unnamed if name in finite and name not in rising]
-    for name in [*candidates[:1], *rounded] if candidates and candidates[0] in called else [*rounded, *candidates[:1]]:
-        unit, t = _read_clock(table, name, finite[name], file)
-        within_day = unit == "hhmmss" or (finite[name].min() >= 0 and finite[name].max() < 1)
-        if within_day and (with_date := _with_date(table, columns, name)):
-            return with_date
-        rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
-        rate = _even_rate(t) if not rises or _is_coarse(t) else None
-        if rate is not None:
-            return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
-        if rises:
-            return {"from": name, "unit": unit}, t
-    if rising and not faulty:
-        unit, t = _read_clock(table, rising[0], finite[rising[0]], file)
-        return {"from": rising[0], "unit": unit}, t
-    called = faulty or called
-    first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
-    if called and called[0] in finite:
-        first = clock_seconds(first, _unit_of_clock(called[0], first))
+        if is_clock(name) or np.isfinite(since).all():
+            tried[name] = since
+    if clock := _in_columns(table, columns, dates):
+        return clock
+    unnamed = list(columns)[:1] if not tried and all(name.isdecimal() for name in columns) else []
+    called = [name for name in columns if is_clock(name)] or unnamed
+    for name in sorted(called, key=lambda name: name not in rising):
+        if np.isfinite(columns[name]).all() and (clock := _of_numbers(table, columns, name, file)):
+            return clock
+    tried |= {name: columns[name] for name in called}
+    tried = {name: t for name, t in tried.items() if name != dates} or tried  # that repeats: the times are at fault
+    faulty = [name for name, t in tried.items() if _nearly_rises(t) or (dates is not None and name in texts)]
+    for name in sorted(rising, key=lambda name: bool(np.all(np.diff(columns[name]) == 1.0))) if not faulty else ():
+        if clock := _of_numbers(table, columns, name, file):  # a counter rises, too
+            return clock
     fault = "none rises from row to row"
-    if called:
-        fault = f"{called[0]!r} {_unreadable_time(table, called[0], first) or _clock_fault(first)}"
+    for name in [*faulty, *tried][:1]:
+        t = tried[name]
+        t = clock_seconds(t, _unit_of_clock(name, t)) if name in columns and np.isfinite(t).all() else t
+        fault = f"{name!r} {_clock_fault(table, name, t)}"
     raise DataError(f"no column can be the clock: {fault}", file=file)
+
+
+def _of_numbers(
+    table: pd.DataFrame, columns: dict[str, Array], name: str, file: Path
+) -> tuple[dict[str, Any], Array] | None:
+    """The clock of a column of numbers, with dates beside it where it is a time of day; None if it does not rise."""
+    unit, t = _read_clock(table, name, columns[name], file)
+    within_day = unit == "hhmmss" or (columns[name].min() >= 0 and columns[name].max() < 1)
+    if within_day and (with_date := _with_date(table, columns, name)):
+        return with_date
+    rate = _even_rate(t) if np.all(np.diff(t) > 0) and _is_coarse(t) else None
+    keys = {"from": name, "unit": unit}
+    return _rising_clock(keys, t) if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
 def zone_questions(head: str, table: pd.DataFrame, clock: dict[str, Any]) -> Iterator[str]:
@@ -284,7 +267,6 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
     if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
         excel, other = (format_date(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
         yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
-    yield from _other_begin(clock, float(t[0]))
     if clock["unit"] not in ("date", "hhmmss") or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
         return
     texts = column_called(table, clock["from"])
@@ -299,22 +281,6 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
         if firsts and len(alike) > 1:
             others = " or ".join(firsts)
             yield f"{texts.iloc[0]!r} is read as {format_date(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
-
-
-def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
-    """Yield a question where a clock of seconds since 1970, first [s], may count from another date (1980, 1904)."""
-    now = datetime.now(UTC).timestamp()
-    if clock["unit"] not in ("s", "ms", "us", "ns") or not FIRST_DATED_TIME < first < LAST_DATE:
-        return
-    begins = f"{clock['from']!r} is read as seconds since 1970, {format_date(first)}: or does it count from"
-    of_gps, of_1904 = first + GPS - (LEAPS if first + GPS > LEAP else 0), first - OF_1904
-    parts = {*name_parts(clock["from"])}
-    of_late = of_gps > LEAP and not parts & OF_1970
-    if (OF_GPS & parts or of_late) and of_gps < now:
-        ahead = f", less {LEAPS} s by which GPS is ahead" if of_gps > LEAP else ""
-        yield f"{begins} 6 January 1980, as GPS does? Then add {GPS} s{ahead}: {format_date(of_gps)} UTC"
-    elif first > now and of_1904 > FIRST_DATED_TIME:
-        yield f"{begins} 1904, as LabVIEW does? Then take {OF_1904} s off: {format_date(of_1904)}"
 
 
 def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
@@ -490,43 +456,23 @@ def _roundest_number(value: float, slack: float) -> float:
     return value
 
 
-def _unreadable_time(table: pd.DataFrame, name: str, values: Array) -> str:
-    """Say which text in a clock is no time, or that there is none; empty where all are."""
-    wrong = ~np.isfinite(values)
-    if not wrong.any():
-        text = str(column_called(table, name).iloc[0]).strip()
-        short = re.fullmatch(r"\d([.,]\d+)?[eE]\+?\d+", text) and np.any(np.diff(values) == 0)
-        return f"holds {text!r} in row 1, with too few digits: export it with all of them" if short else ""
-    texts = column_called(table, name).astype(str).str.strip()
-    of_day = texts.str.fullmatch(TIME_OF_DAY).to_numpy(dtype=bool)
-    wrong = ~of_day if wrong.all() and of_day.mean() > 0.5 else wrong  # a single other text, and none is read
-    row = int(np.argmax(wrong))
-    text = texts.iloc[row]
-    if NO_VALUE.fullmatch(text.lower()):
-        return f"has no value in row {row + 1}"
-    begin = f"holds {text[:40]!r} in row {row + 1}"
-    if re.fullmatch(r"\d{1,3}([,.' \u00a0]\d{3})+([.,]\d*)?", text):
-        return f"{begin}: take the mark of thousands out of the log"
-    if wrong.all():
-        return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
-    if np.isfinite(parse_dates(pd.Series([text]))[0]) and not np.isfinite(pd.to_numeric(text, errors="coerce")):
-        return f"{begin}, and other rows are written otherwise: write all in one way, with a zone in each or in none"
-    what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
-    lines = "the line" if wrong.sum() == 1 else f"the {wrong.sum()} such lines"
-    return f"{begin}, {what}: remove {lines}"
-
-
 def _nearly_rises(values: Array) -> bool:
     """Whether a column (N,) rises but for a few rows that are lost or go back, as a clock with a fault does."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps) > FEWEST * len(values) and np.mean(steps > 0) > NEARLY)
 
 
-def _clock_fault(values: Array) -> str:
-    if not np.isfinite(values).any():
-        return "holds no numbers and no dates"
-    if not np.isfinite(values).all():
-        return f"has no value in row {int(np.argmax(~np.isfinite(values))) + 1}"
+def _clock_fault(table: pd.DataFrame, name: str, values: Array) -> str:
+    """What is wrong with a clock (N,): its first text that is no time, or where it goes back or repeats."""
+    wrong = ~np.isfinite(values)
+    if wrong.any():
+        texts = column_called(table, name).astype(str).str.strip()
+        of_day = texts.str.fullmatch(TIME_OF_DAY).to_numpy(dtype=bool)
+        wrong = ~of_day if wrong.all() and of_day.mean() > 0.5 else wrong  # a single other text, and none is read
+        row = int(np.argmax(wrong))
+        count = f" or in {wrong.sum() - 1} rows like it" * bool(wrong.sum() > 1)
+        remedy = "remove them, or write all times in one way, as 2024-05-14 08:00:00"
+        return f"holds {texts.iloc[row][:40]!r} in row {row + 1}, no number or time that can be read{count}: {remedy}"
     row = int(np.argmax(np.diff(values) < 0)) + 1
     if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
         before, after = format_moment(values[row - 1]), format_moment(values[row])

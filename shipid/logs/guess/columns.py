@@ -44,7 +44,6 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 NUMBERED = 0.95  # share of the rows, at least, whose number is the next one: a few may be lost, or a file begin anew
-IN_BURSTS = 0.1  # usual step over mean step of a clock, at most, where no window is without a hole
 
 
 @dataclass(frozen=True)
@@ -116,12 +115,6 @@ def guess(
     if len(state.chosen.first) < 5:
         rows = f"{len(sniffed.t)} rows over {sniffed.t[-1] - sniffed.t[0]:.3g} s are too few for a draft"
         clock = f"is {sniffed.clock['from']!r} the clock, in {sniffed.clock['unit']}?"
-        usual, mean = float(np.median(np.diff(sniffed.t))), float(np.mean(np.diff(sniffed.t)))
-        if usual < IN_BURSTS * mean:
-            rows = (
-                f"{sniffed.clock['from']!r} comes in bursts: most steps are {usual:.3g} s, their mean is {mean:.2g} s"
-            )
-            clock = "a recorder that writes what it has gathered does so: write the time at which each row was measured"
         raise DataError(f"{rows}: {clock}", file=source.path)
     outputs = reserve_outputs(state)
     choose_motion(state, source.path, frame)

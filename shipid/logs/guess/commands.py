@@ -14,12 +14,15 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import (
+    ORDERS,
+    SOURCES,
     is_electrical,
     is_engine,
     is_order,
     meaning_scores,
     name_parts,
     number_in_name,
+    side_in_name,
     units_in_name,
 )
 from shipid.logs.mapping import UNITS, to_si
@@ -30,6 +33,7 @@ TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
 FASTEST, GEARED = 200.0, 5.0  # rev/s: no shaft is faster; an engine that is faster usually has a gear
 PULSES = (700.0, 2300.0)  # us: what a servo takes is about 1500, from 1000 to 2000
+OFTEN_ASTERN = 0.01  # share of the windows, from which a shaft without a sense is asked about
 NOISE = 0.02  # of the range of an order: less is no motion of it
 SERVO, OFF_SERVO = 1500.0, 100.0  # us: its middle, and how far a stopped screw may be from it
 SHARES = {
@@ -246,6 +250,9 @@ def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict
         if not tunnel and not azimuth and _runs_astern(state, name):
             extra = {**extra, "sign": -1}
             why += "; negative while the ship goes ahead"
+        if not tunnel and not state.astern and _hides_astern(state, name):
+            words = f"{name!r} is never negative, but turns while the ship goes astern: which column says its sense"
+            state.ask(("n",), f"{words}? Without one its turns astern are taken as ahead")
     state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
@@ -310,10 +317,23 @@ def _hard_over(state: State) -> float:
 
 def _runs_astern(state: State, name: str) -> bool:
     """Whether a shaft is negative nearly always when the ship goes ahead."""
+    ahead, shaft = _way_and_shaft(state, name)
+    fast = ahead > 0.3
+    return bool(fast.any() and np.mean(shaft[fast] < 0) > SETTINGS.astern)
+
+
+def _hides_astern(state: State, name: str) -> bool:
+    """Whether a shaft that is never negative turns while the ship goes astern."""
+    ahead, shaft = _way_and_shaft(state, name)
+    turning = shaft > 0.2 * float(np.max(shaft, initial=0.0))
+    return bool(state.columns[name].min() >= 0.0 and np.mean(turning & (ahead < -0.1)) > OFTEN_ASTERN)
+
+
+def _way_and_shaft(state: State, name: str) -> tuple[Array, Array]:
+    """The way ahead over each window, as a share of the usual way, and the shaft in its middle, (W,) each."""
     middle = (state.chosen.first + state.chosen.last) // 2
     ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
-    fast = ahead > 0.3 * float(np.percentile(np.abs(ahead), 90))
-    return bool(fast.any() and np.mean(state.columns[name][middle[fast]] < 0) > SETTINGS.astern)
+    return ahead / max(float(np.percentile(np.abs(ahead), 90)), 1e-12), state.columns[name][middle]
 
 
 # --- actuators whose quantity no name says ---
@@ -354,8 +374,9 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         _take_servo(state, steers, turn[steers], used)
         steered = True
     drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
-    if drives and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives])):
-        alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
+    alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
+    seen = bool(drives) and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives]))
+    if seen or (drives and _is_plain_actuator(drives)):
         zero, why = _neutral_value(state, drives)
         words = (
             f"more of {' and '.join(map(repr, alike))} drives the ship ahead. Of which shaft speed is a value of 1? "
@@ -461,6 +482,12 @@ def _says_actuator(state: State, name: str) -> bool:
     """Whether a name says an order, a throttle or per cent, or its numbers are pulses."""
     said = is_order(name) or bool(OF_ACTUATORS & {*name_parts(name)}) or unit_in_name(name, "rev/s") == "%"
     return said or _are_pulses(state.columns[name])
+
+
+def _is_plain_actuator(name: str) -> bool:
+    """Whether a name says an actuator, its side, its number, an order and nothing else: no `motor temp`."""
+    aside = OF_ACTUATORS | ORDERS | SOURCES
+    return all(part in aside or part.isdigit() or side_in_name(f"x {part}") for part in name_parts(name))
 
 
 def _may_be_actuator(state: State, name: str) -> bool:

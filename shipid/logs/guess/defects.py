@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import FIRST_DATED_TIME, Array, Dataset
 from shipid.errors import DataError
 from shipid.identification.diagnosis import NONE, Diagnosis, diagnose
-from shipid.logs.dates import LAST_DATE, format_date, rollover_words
+from shipid.logs.dates import LAST_DATE, format_date
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
@@ -39,7 +39,6 @@ FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a
 NO_PLACE, FAR_STEPS = 0.01, 20.0  # deg, and usual steps, by which rows about it are away from it, at least
 LOST = 0.5  # share of the rows without a fix, at most
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
-FARTHER = 2.0  # times the way from row to row that a ship would go in a hole of the clock, at least
 NOTHING, OFTEN = 0.3, 20.0  # share of the rows that are 0 for no value, at most; s of a speed that count as a spike
 TURN_SHOWS, SEVERAL = np.radians(3.0), 40  # of the heading in a window in which the ship turns; windows at least
 IDENTICAL, EQUAL, ROUND = 0.9, np.radians(0.01), np.radians(1.0)  # share of rows; apart; largest step of a column
@@ -84,7 +83,6 @@ def defects_of_motion(state: State) -> None:
         _report_position_jumps(state, _own_path(state))
         _report_heading_offset(state)
         return
-    _ask_for_set_clock(state)
     _report_position_jumps(state, _report_causes(state, () if course else ("psi", "r")))
     _report_heading_offset(state)
 
@@ -104,7 +102,7 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             repair: dict[str, Any] = {"kind": "lever_arm", "x": round(size[0], 2), "y": round(size[1], 2)}
             words = f"{size[0]:+.1f} m forward and {size[1]:+.1f} m to starboard of the velocities'"
             _find_cause(state, "lever arm", f"positions are of a point {words}", found, repair | {"moves": "position"})
-        elif key == "sensor r scale":
+        elif key == "sensor r scale" and state.r is not None:
             sentence = f"the heading is {1 / size[0]:.4f} times the integral of the yaw rate"
             repair = {"kind": "scale", "columns": ["r"], "factor": round(1 / size[0], 4)}
             _find_cause(state, "factor", sentence, found, repair)
@@ -235,24 +233,6 @@ def _own_path(state: State) -> Complex:
         for part in (rates.real, rates.imag)
     ]
     return np.asarray(np.append(0j, np.cumsum((usual[0] + 1j * usual[1]) * steps.to_numpy())))
-
-
-def _ask_for_set_clock(state: State) -> None:
-    """Ask where the clock leaves out a time in which the ship, that was under way, went no farther than in a row."""
-    if state.joined or state.velocity is None:
-        return
-    steps, way = np.diff(state.t), np.abs(np.diff(state.position))
-    usual, fast = float(np.median(steps)), np.abs(state.velocity)
-    speed = np.minimum(fast[:-1], fast[1:])
-    near = float(np.percentile(way[steps < evidence.GAP * usual], 99))
-    for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
-        times = " comes ".join(clock_text(state, float(state.t[row + one])) for one in (0, 1))
-        times += rollover_words(steps[row])
-        state.ask(
-            ("clock", "t"),
-            f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
-            f"Then split the log there",
-        )
 
 
 def _report_position_jumps(state: State, path: Complex) -> None:

@@ -28,7 +28,6 @@ ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose 
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
 GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
-LONG_WIDTH = 8  # cells, at most, of a row with one value: time, name, value, unit, quality and the like
 MOST_HEADS = 3  # lines above the data: names in two, and units
 WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
 STATISTICS = re.compile(
@@ -117,9 +116,8 @@ def _text_format(
     for line, sign in itertools.product(lines, separators):
         check_width(len(line.split()) if sign == "whitespace" else line.count(sign) + 1, file)
     score, separator, decimal, mark = _guess_marks(lines, separators)
-    _refuse_long([split_cells(line, separator) for line in lines if line.strip()] if separator else [], file)
     if score < NUMERIC / 2:
-        raise DataError("no table of numbers with any separator: export it as CSV", file=file)
+        raise DataError("no table of numbers with any separator: export it as CSV, a row for each time", file=file)
     rows = [split_cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
     places = _places_of_numbers([row for row in rows if len(row) == width], decimal, mark)
@@ -195,24 +193,6 @@ def _guess_marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, 
             if score > best[0]:  # the first of equals: tabs are blanks, too
                 best, alike = (score, separator, decimal, mark), count
     return best
-
-
-def _refuse_long(rows: list[list[str]], file: Path) -> None:
-    """Raise DataError where a row has one value, and a cell that says of what, as historians write."""
-    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
-    held = [row for row in rows if len(row) == width][1:]
-    for place in range(width if 3 <= width <= LONG_WIDTH else 0):
-        column = [row[place] for row in held]
-        if len({*column}) > len(column) / 2 or any(map(_is_number, column)):
-            continue
-        quantities = {next(filter(None, meaning_scores(cell)), "") for cell in {*column}} - {""}
-        if len(quantities) < 3:
-            continue
-        if np.mean([one != other for one, other in itertools.pairwise(column)]) > 0.5:  # the tags take turns
-            first = ", ".join(map(repr, list(dict.fromkeys(column))[:3]))
-            message = f"a row for each value, called {first} and so on: write a row for each time, a column for each"
-            how = "such as with pandas: pivot_table(index=..., columns=..., values=...)"
-            raise DataError(f"{message}, {how}", file=file)
 
 
 def _header_above(heads: list[list[str]]) -> list[str]:

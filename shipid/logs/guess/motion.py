@@ -104,11 +104,7 @@ def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], se
     words = _reading_in_words(best, axes)
     if pose.astern:
         state.astern = True
-        shafts = [name for name in state.called("n") if np.median(state.columns[name]) < 0.0]
-        why = f"{shafts[0]!r} is negative" if shafts else "another heading would not fit"
-        if best.velocity is not None and best.velocity.kind == "body":
-            why = f"{best.velocity.first!r} along the heading gives the track"
-        said = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
+        said = "course and heading differ by about 180 deg: the ship goes astern, as shafts or velocities say"
         state.find("astern", (pose.heading,), 0.8, said)
     elif sense.quarter == 2 and sense.sign > 0:
         said = f"does the ship go astern, or has {pose.heading!r} another zero? If it goes astern, take the offset out"
@@ -148,7 +144,10 @@ def _ask_about_names(state: State, best: MotionReading) -> None:
     if is_magnetic(pose.heading):
         words = f"{pose.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
         state.ask(("psi", "v"), f"{words} A `heading_offset` is one for all courses")
-    if pose.misfit > SETTINGS.poor and not state.numbered:
+    shown = (
+        best.velocity is not None and best.velocity.fit.left < SETTINGS.left
+    )  # a ship that drifts keeps to no heading
+    if pose.misfit > SETTINGS.poor and not shown and not state.numbered:
         words = f"course and heading agree badly (misfit {pose.misfit:.2f}): are {first!r}, {second!r} the position"
         state.ask(("psi", "north", "east", "u", "v", "r"), f"{words} and {pose.heading!r} the heading?")
     lengths = [name for name in (first, second) if LENGTHS.search(name)]

@@ -34,11 +34,11 @@ from shipid.physics.signals import rows_of_role
 Frame = Literal["ned", "enu", "zup", "ros"]
 """Where x, y point and from where the heading counts: north, east, clockwise from north; east, north, clockwise from
 north; ahead and to port, counter-clockwise; east, north, counter-clockwise from east."""
-COMPASS = frozenset(("heading hdg hdt head compass kompass gyro kreisel kurs course baug psi steuer rumbo cap").split())
-DIRECTIONS = frozenset("north northing nord norte noord east easting ost oest este".split())
+COMPASS = frozenset("heading compass gyro course prow psi steered".split())
+DIRECTIONS = frozenset("north east este".split())
 OTHER_WAY = frozenset("w west ouest oeste vest south sud sur syd zuid".split())
 """Parts of the name of a longitude or latitude that counts to the west or south."""
-YAW = frozenset(["yaw", "gier", "gir", "theta"])
+YAW = frozenset(["yaw", "theta"])
 RADIUS, OFF_RADIUS = 6.368e6, 2.5e4  # m: from the centre of the Earth to its ellipsoid, with hills
 LENGTHS = re.compile(r"/ ?L(?:_?(?:pp|bp|wl|oa))?\b", re.IGNORECASE)
 """The end of the name of a position in ship lengths, such as X/Lpp."""
@@ -183,10 +183,9 @@ def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[
     places, headings = list(_named_places(state)), _named_headings(state)
     for again in (True, False):
         poses = _rank_poses(state, places, headings)
-        poses = [one for one in poses if one.misfit < SETTINGS.poor] or poses
         if not poses or poses[0].misfit > SETTINGS.poor:
             poses = _pose_beyond_names(state, poses, places, headings)
-        if again and poses and poses[0].misfit < SETTINGS.poor:
+        if again and poses:
             theta = _plane_heading(state, poses[0])
             state.chosen = evidence.row_windows(state.t, evidence.window_length(state.t, theta, state.chosen))
     if not poses or (poses[0].misfit > SETTINGS.poor and not (places and headings)):
@@ -217,10 +216,11 @@ def _named_places(state: State) -> Iterator[Place]:
 
 
 def _named_headings(state: State) -> list[str]:
+    turned = [name for name, unit in state.units.items() if unit == "quaternion"]
     names = [name for name in state.all_called("psi") if not is_order(name) or may_be_measured(name)]
     names = [name for name in names if not is_magnetic(name)] or names  # beside a true one it is a second one
     courses = _logged_courses(state, "")
-    names = [name for name in names if name not in courses] or names
+    names = turned + [name for name in names if name not in {*courses, *turned}] or names
     if not names:  # of a plane x, y, theta, which takes more than a quarter of a turn, as no pitch does
         names = [
             name
@@ -248,28 +248,26 @@ def _pose_beyond_names(state: State, named: list[Pose], places: list[Place], hea
     ways = [name for name in dict.fromkeys([*headings, *free]) if name not in courses]
     found = _rank_poses(state, [*places, *wide], ways)
     found = [one for one in found if one.misfit < SETTINGS.poor]
-    best = next(iter(found), None)
-    if best is None or (named and best.misfit > 0.5 * named[0].misfit):
-        return named
-    if named and not state.numbered and not state.findings:
-        old, new = named[0], best
+    if named and found and found[0].cost < named[0].cost and not (state.numbered or state.findings):
+        old, new = named[0], found[0]
         words = ", ".join(map(repr, (old.place.first, old.place.second, old.heading)))
         sources = new.place.first, new.place.second, new.heading
         words += f" do not fit together as position and heading (misfit {old.misfit:.2f}); "
         state.find("misleading names", sources, 0.6, f"{words}{', '.join(map(repr, sources))} do ({new.misfit:.3f})")
-    return found
+    return sorted([*named, *(one for one in found if one not in named)], key=lambda one: one.cost)
 
 
 def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[Pose]:
     """Every position with every heading in every unit, the cheapest first: how well the track keeps to the heading."""
     middle = (state.chosen.first + state.chosen.last) // 2
     thin = max(1, len(middle) // MOST_WINDOWS)
-    named = {*state.all_called("psi")}
+    named = {*state.all_called("psi"), *(name for name, unit in state.units.items() if unit == "quaternion")}
     turned: list[tuple[str, float, float, Complex]] = []
     for name in headings:
         if name not in named and np.ptp(state.columns[name]) * to_si(_angle_unit(state, name), "psi") < SETTINGS.turned:
             continue  # anything that hardly changes keeps to a straight course
-        cost = -np.log(SETTINGS.unnamed + meaning_scores(name).get("psi", 0.0) * (1.0 if name in named else 0.2))
+        score = 1.0 if name in state.units else meaning_scores(name).get("psi", 0.0)  # a quaternion is of a pose
+        cost = -np.log(SETTINGS.unnamed + score * (1.0 if name in named else 0.2))
         for turn, more in _turns_of_angle(state, name):
             turned.append((name, turn, float(cost + more), np.exp(1j * _angle(state, name, turn)[middle][::thin])))
     poses = []
@@ -282,6 +280,10 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
             ranked = senses_of_angle(track, way)
             spread = 1.0 - abs(complex(np.mean(way)))
             alike = ranked[1][0] < 2.0 * max(ranked[0][0], 1e-9) or spread < SETTINGS.spread
+            if ranked[0][0] > SETTINGS.poor:  # a ship that drifts far: any sense that is not against the track
+                ranked += [
+                    one for one in _all_senses(track, way) if one[0] < 1.0 and one[1] not in dict(ranked).values()
+                ]
             for misfit, sense in ranked if alike else ranked[:1]:
                 across = SETTINGS.quarter * (sense.sign > 0 and sense.quarter != 0)
                 share = (misfit + SETTINGS.floor + across) / (spread + SETTINGS.spread)
@@ -291,11 +293,26 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
 
 def senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     """How an angle, exp(i angle) (W,), may count in the plane of a track (W,): misfit and sense, the better first."""
-    size = max(float(np.sum(np.abs(track))), 1e-12)
-    means = [(sign, complex(np.sum(track * one)) / size) for sign, one in ((1, np.conj(way)), (-1, way))]
-    quarters = [(round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1 for _, mean in means]
-    senses = [(1.0 - abs(mean), Sense(sign, one)) for (sign, mean), one in zip(means, quarters, strict=True)]
+    means = _mean_turns(track, way)
+    quarters = [(round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1 for mean in means]
+    senses = [(1.0 - abs(mean), Sense(sign, one)) for sign, mean, one in zip((1, -1), means, quarters, strict=True)]
     return sorted(senses, key=lambda one: one[0])
+
+
+def _all_senses(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
+    """All senses of an angle, exp(i angle) (W,), in the plane of a track (W,), with their misfits."""
+    signed = zip((1, -1), _mean_turns(track, way), strict=True)
+    return [
+        (1.0 - (mean * np.exp(-0.5j * np.pi * one)).real, Sense(sign, one))
+        for sign, mean in signed
+        for one in range(-1, 3)
+    ]
+
+
+def _mean_turns(track: Complex, way: Complex) -> list[complex]:
+    """The mean of a track (W,) seen from an angle, exp(i angle) (W,), that counts with it, and against it."""
+    size = max(float(np.sum(np.abs(track))), 1e-12)
+    return [complex(np.sum(track * one)) / size for one in (np.conj(way), way)]
 
 
 def _turns_of_angle(state: State, name: str) -> Iterator[tuple[float, float]]:
@@ -334,6 +351,14 @@ def _as_astern(state: State, pose: Pose) -> Pose:
 def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> MotionReading | None:
     """The motion with this pose; None where it cannot be in the frame."""
     place = pose.place
+    if frame is not None and pose.misfit > SETTINGS.poor:  # the track does not say the sense, the frame does
+        axes, sense = FRAMES[frame]
+        pose = next(
+            one
+            for sign in (1, -1)
+            for quarter in range(-1, 3)
+            if axes.sense((one := replace(pose, sense=Sense(sign, quarter))).sense) == sense
+        )
     plane = local_plane(state, place.first, place.second, place.on_globe)
     theta = _plane_heading(state, pose)
     seen = state.chosen.change(plane)
@@ -362,7 +387,7 @@ def _readings(state: State, pose: Pose, seen: Complex, frame: str | None) -> Ite
     place, compass = pose.place, _is_compass(pose.heading)
     if frame is not None:
         axes, sense = FRAMES[frame]
-        if not place.on_globe and (axes.sense(pose.sense) == sense or pose.misfit > SETTINGS.poor):
+        if not place.on_globe and axes.sense(pose.sense) == sense:
             yield 0.0, axes, f"--frame {frame}"
         return
     others = [*_course_axes(state, pose, seen), *_velocity_axes(state, place, seen)] if pose.misfit < 0.5 else []
@@ -371,8 +396,6 @@ def _readings(state: State, pose: Pose, seen: Complex, frame: str | None) -> Ite
     )
     for axes in ALL_AXES:
         cost = _sense_cost(axes.sense(pose.sense), compass, plain and pose.sense == Sense())
-        if pose.misfit > SETTINGS.unseen and not state.numbered:  # the track says nothing
-            cost = 0.0
         first, second = ("east", "north") if axes.swap else ("north", "east")
         if place.on_globe:
             if axes.swap:

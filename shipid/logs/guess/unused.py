@@ -40,12 +40,8 @@ def unused_reasons(state: State, numbering: tuple[str, ...] = ()) -> dict[str, s
 def _unused_reason(state: State, name: str) -> str:
     scores = meaning_scores(name)
     if not scores:
-        rises = is_clock(name) and bool(np.all(np.diff(state.columns[name]) > 0))
-        rate = float(np.ptp(state.columns[name]) / np.ptp(state.t)) if rises else 0.0
-        goes = f", which goes {rate:.5g} times as fast as that of the draft" * (abs(rate - 1.0) < 0.1)
-        plain = (
-            f"it is another clock{goes}" if rises else "its name says no known quantity, and no other column is like it"
-        )
+        plain = "its name says no known quantity, and no other column is like it"
+        plain = "it is another clock" if is_clock(name) else plain
         return next((REMEDIES[part] for part in name_parts(name) if part in REMEDIES), plain)
     meaning = max(scores, key=scores.__getitem__)
     if meaning not in {*SIGNALS, *INPUTS, "x", "y", "velocity_north", "velocity_east"}:

@@ -13,196 +13,147 @@ from functools import cache
 from shipid.logs.amounts import UNIT_WORDS, is_known
 from shipid.physics.signals import SIGNALS
 
-PHRASES: dict[str, str] = {
-    "latitude": (
-        "lat, lati, plat, phi gps, latitude, breite, breitengrad, bredde, breddegrad, latitud, latitudine, "
-        "geogr breite, breedtegraad, breedte, geogr bredde, ligne latitude, latitude gps"
-    ),
-    "longitude": (
-        "lon, longi, plon, lambda gps, lambda, long, lng, longitude, laenge, laengengrad, lengde, lengdegrad, "
-        "longitud, longitudine, geogr laenge, lengtegraad, geogr lengde, longitude gps"
-    ),
-    "north": (
-        "x north, y north, "
-        "n, north, northing, pos north, pos n, north pos, x 0, x n, x ned, x earth, eta 1, x e, nord, nordwert, "
-        "hochwert, utm n, utm north, utm y, nord pos, norte, xn, ned x, ned n, ned north, delta north, dist north"
-    ),
-    "east": (
-        "x east, y east, "
-        "est, e, east, easting, pos east, pos e, east pos, y 0, y n, y ned, y earth, eta 2, y e, ost, ostwert, "
-        "rechtswert, utm e, utm east, utm x, oest, oestlig, este, ye, ned y, ned e, ned east, delta east, dist "
-        "east"
-    ),
-    "x": ("xpos, posx, x, pos x, x pos, odom x, x coordinate, enu x, local x"),
-    "y": ("ypos, posy, y, pos y, y pos, odom y, y coordinate, enu y, local y"),
-    "psi": (
-        "magnet kompass, magnetic heading, magnetic compass, psi, heading, hdg, hdt, head, gyro, compass, "
-        "kompass, kreisel kurs, kreisel, steuer kurs, vorauskurs, yaw, yaw angle, yaw pos, yaw 0, gier winkel, "
-        "gir vinkel, kurs vinkel, baug retning, ship heading, gyro heading, compass heading, gyro hdg, kurs, "
-        "course, eta 3, eta 6, theta z, rumbo, cap, styrt kurs, hehdt, bow angle, kurs winkel, rw kurs, rwk, "
-        "kompass kurs, gyro kurs, cap vrai, cap compas, cap gyro, cap navire, cap magnetique, rumbo verdadero, "
-        "rumbo aguja, proa, prua, prora, prua vera, prua bussola, koers, voorliggende koers, kompas koers, gyro "
-        "koers, styret kurs, styrd kurs, kompas kurs, lacet, angle lacet, angulo guinada, guinada, imbardata, "
-        "gier hoek, stevn"
-    ),
-    "speed": (
-        "sog, speed, spd, speed over ground, ground speed, ship speed, u, v, fahrt, fahrt ueber grund, fahrt ue "
-        "grund, fueg, fug, geschwindigkeit, fart, fart over grunn, vtg sog, vg, v g, velocity, groundspeed, vitesse, "
-        "velocidad, uog, speed og, hastighet, gps speed, abs speed, total speed, vitesse fond, vitesse navire, "
-        "vitesse sol, velocidad fondo, velocidad sobre fondo, velocidad buque, vel fondo, velocita, velocita fondo, "
-        "velocita nave, snelheid, snelheid over grond, grond snelheid, vaart over grond, vog, fart over grund, fart "
-        "over bunden, fog, schiffs geschwindigkeit, grund geschwindigkeit, skips fart"
-    ),
-    "course": (
-        "cog, course, crs, track, course over ground, track angle, kurs ueber grund, kurs ue grund, kueg, kug, kurs, "
-        "kurs over grunn, chi, vtg cog, course og, tmg, course made good, track made good, ground course, bahn winkel, "
-        "route fond, route, route vraie, route sur fond, rumbo fondo, rumbo sobre fondo, rumbo efectivo, derrota, "
-        "rotta, rotta vera, rotta fondo, grond koers, koers over grond, kog, kurs over grund, kurs over bunden, "
-        "beholden kurs, kurs grund"
-    ),
-    "u": (
-        "u, surge, surge vel, surge speed, v long, long speed, long vel, speed long, vel x, v x, nu 1, speed fwd, "
-        "fwd speed, forward speed, speed forward, forward vel, ahead speed, speed ahead, laengs geschwindigkeit, "
-        "v laengs, fahrt laengs, jag hastighet, fart langs, x dot, body u, u body, v fwd, vel long, long fart, "
-        "speed x, v surge, vitesse long, vitesse avance, vitesse axiale, vitesse avant, vitesse cavalement, "
-        "cavalement, velocidad long, velocidad avance, velocita long, velocita avanzo, langs snelheid, "
-        "langsscheepse snelheid, langs hastighet, langskips hastighet, langskips fart, laengs hastighet, u vel, "
-        "vel u, linear x"
-    ),
-    "v": (
-        "v, sway, sway vel, sway speed, v trans, trans speed, lat speed, lateral speed, speed trans, speed lat, "
-        "vel y, v y, nu 2, speed stbd, speed starboard, transverse speed, quer geschwindigkeit, v quer, fahrt "
-        "quer, svai hastighet, fart tvers, y dot, body v, v body, v lat, vel lat, v stbd, athwart speed, lateral "
-        "vel, trans vel, tvers fart, drift speed, speed y, v sway, vitesse trans, vitesse embardee, vitesse "
-        "laterale, velocidad trans, velocidad deriva, velocita trans, velocita deriva, velocita scarroccio, dwars "
-        "snelheid, dwarsscheepse snelheid, tverr hastighet, tverrskips hastighet, tverrskips fart, tvaers "
-        "hastighet, tvers hastighet, tverr fart, v vel, vel v, "
-        "linear y"
-    ),
-    "velocity_north": (
-        "vn, v n, v north, vel north, vel n, north vel, north speed, speed north, geschwindigkeit nord, v nord, "
-        "hastighet nord, x dot, ned vel n, vel x, v x, speed n, enu vel y, nord fart, vitesse nord, velocidad "
-        "norte, velocita nord, snelheid noord"
-    ),
-    "velocity_east": (
-        "ve, v e, v east, vel east, vel e, east vel, east speed, speed east, geschwindigkeit ost, v ost, "
-        "hastighet oest, v oest, y dot, ned vel e, vel y, v y, speed e, enu vel x, oest fart, vitesse est, "
-        "velocidad este, velocita est, snelheid oost"
-    ),
-    "r": (
-        "rotasjons hastighet, rotasjons fart, r, rot, turn, yaw rate, rate of turn, turn rate, rate turn, gyro z, gyro "
-        "rate, w z, omega z, psi dot, nu 6, nu 3, yaw vel, yaw speed, dreh rate, dreh geschwindigkeit, gier "
-        "geschwindigkeit, gier rate, giring hastighet, sving rate, gir rate, girrate, ang vel z, angular velocity "
-        "z, heading rate, hdg rate, wende geschwindigkeit, d psi, gir hastighet, taux giration, vitesse giration, "
-        "vitesse lacet, taux lacet, giration, velocidad giro, velocidad guinada, razon giro, regimen giro, "
-        "velocita accostata, velocita imbardata, velocita virata, rateo accostata, rateo virata, draai snelheid, "
-        "gier snelheid, sving hastighet, dreie hastighet, dreie rate, svinge rate, drei hastighet, girings "
-        "hastighet, dreje hastighed, dreje rate, wende rate, wende zeiger, gyro rate z, yaw dot, "
-        "angular z"
-    ),
-    "phi": (
-        "phi, roll, roll angle, heel, heel angle, roll winkel, kraengung, rull, krengning, eta 4, gite, angle "
-        "gite, roulis, angle roulis, escora, angulo escora, balance, sbandamento, angolo sbandamento, rollio, "
-        "slagzij, helling, helling hoek, rol hoek, slingering, krenge vinkel, krengnings vinkel, slag side, rull "
-        "vinkel, krangning, krangnings vinkel, kraengungs winkel, kraengung winkel, schlagseite, quer neigung"
-    ),
-    "theta": (
-        "theta, pitch, pitch angle, trim, trim angle, stampf winkel, trimm, stamp, eta 5, tangage, angle tangage, "
-        "assiette, cabeceo, beccheggio, assetto, angolo beccheggio, stamp hoek, stamp vinkel, trim winkel, nick "
-        "winkel, laengs neigung"
-    ),
-    "p": ("p, roll rate, nu 4, gyro x, omega x"),
-    "q": ("q, pitch rate, nu 5, gyro y, omega y"),
-    "V_w": (
-        "wind, wind speed, wind spd, wind vel, tws, true wind speed, v w, v wind, wind geschwindigkeit, vind "
-        "hastighet, vind fart, wind force, aws, rel wind speed, app wind speed, apparent wind speed, relative "
-        "wind speed, vent, vitesse vent, viento, velocidad viento, vento, velocita vento, wind snelheid, wind "
-        "kracht, vind, vind styrke, vind hastighed, wind staerke"
-    ),
-    "beta_w": (
-        "wind direction, wind dir, wind angle, twd, twa, true wind direction, beta w, gamma w, wind richtung, "
-        "vind retning, wind from, awa, rel wind angle, app wind angle, apparent wind angle, relative wind angle, "
-        "rel wind dir, relative wind direction, wind winkel, direction vent, dir vent, angle vent, direccion "
-        "viento, dir viento, angulo viento, direzione vento, dir vento, angolo vento, wind richting, wind hoek, "
-        "vind riktning, vind vinkel"
-    ),
-    "delta": (
-        "delta, rudder, rudder angle, rudder position, rudder pos, rsa, rud, rud ang, rud angle, helm, helm "
-        "angle, ruder, ruder winkel, ruder lage, ror, ror vinkel, delta r, dr, d r, rudder ang, timon, flap "
-        "angle, steering angle, barre, angle barre, position barre, gouvernail, angle gouvernail, safran, angle "
-        "safran, angulo timon, pala, angulo pala, timone, angolo timone, barra, angolo barra, roer, roer hoek, "
-        "roer stand, ror utslag, ror stilling, roder, roder vinkel, ruder ausschlag, ruder stellung, ruder stand, "
-        "steering gear angle"
-    ),
-    "alpha": (
-        "alpha, azimuth, azi, azimuth angle, azi angle, azi ang, azipod, azipod angle, pod angle, pod, thruster "
-        "angle, thruster azimuth, azimut, azimut winkel, gondel winkel, schottel winkel, asimut, asimut vinkel, "
-        "alpha t, nozzle angle, thrust angle, thruster direction, pod azimuth, azimuth vinkel, azi dir, angle "
-        "azimut, angle propulseur, angulo azimut, angolo azimut, ruderpropeller winkel, azimut hoek, azimuth "
-        "hoek, azimuth winkel, pod winkel, srp, srp angle, srp winkel, outboard, outboard angle, outboard steering "
-        "angle, drive angle, stern drive angle, sterndrive angle, jet angle, waterjet angle, asd, asd angle, z "
-        "drive, z drive angle, zdrive angle"
-    ),
-    "n": (
-        "n, rpm, shaft, shaft rpm, shaft speed, prop rpm, propeller rpm, propeller speed, prop speed, engine rpm, "
-        "me rpm, main engine rpm, engine speed, main engine speed, revs, rev, prop revs, propeller revs, dreh "
-        "zahl, propeller dreh zahl, wellen dreh zahl, motor dreh zahl, tur tall, propell tur tall, aksel tur "
-        "tall, rps, n p, n prop, thruster rpm, thruster speed, thruster dreh zahl, thruster tur tall, thruster "
-        "toeren tal, thruster giri, thruster regime, thruster vitesse, thruster revs, thruster n, pod rpm, "
-        "revolutions, shaft revolutions, n shaft, motor speed, motor rpm, n engine, propeller, prop, engine, azi "
-        "rpm, azimuth rpm, umdrehungen, revoluciones, turns, vitesse arbre, vitesse helice, vitesse rotation, "
-        "vitesse rotation helice, regime, regime arbre, regime helice, regime moteur, tours helice, tours arbre, "
-        "tours minute, tours, helice, arbre helice, rpm eje, rpm helice, velocidad eje, velocidad helice, "
-        "revoluciones eje, revoluciones helice, revoluciones motor, vueltas, giri, giri elica, giri asse, giri "
-        "motore, velocita asse, velocita elica, elica, toeren tal, toeren, schroef toeren tal, as toeren tal, "
-        "schroef toeren, schroef, propell omdreininger, omdreininger, omdreinings tall, motor tur tall, "
-        "omdrejninger, omdrejnings tal, propel omdrejninger, varv tal, propeller varv tal, axel varv tal, "
-        "erpm, motor erpm, esc erpm, shaft erpm, thruster erpm, e rpm, electrical rpm, electric rpm, elec rpm, "
-        "schrauben dreh zahl, schrauben welle, welle, wellen rpm, propell rpm, aksel rpm, shaft revs, shaft rev"
-    ),
-    "pitch": (
-        "cpp, cpp pitch, prop pitch, propeller pitch, pitch ratio, p d, pas helice, propeller steigung, steigung, "
-        "propell stigning, stigning, schroef spoed, spoed, paso helice, passo elica"
-    ),
-    "thrust": (
-        "thrust, t n, t prop, propeller thrust, prop thrust, shaft thrust, thrust p, schub, propeller "
-        "schub, wellen schub, schub kraft, skyvekraft, skyve kraft, poussee, poussee helice, empuje, empuje "
-        "helice, spinta, spinta elica, stuw kracht, thrust force"
-    ),
-    "torque": (
-        "torque, q, q prop, shaft torque, propeller torque, prop torque, dreh moment, drehmoment, wellen "
-        "drehmoment, wellen moment, dreiemoment, dreie moment, akselmoment, vrid moment, couple, couple arbre, "
-        "couple helice, par motor, par eje, par helice, coppia, koppel, moment shaft"
-    ),
-    "normal_force": (
-        "rudder force, rudder normal force, normal force, f n, fn, ruder normalkraft, ruder kraft, rorkraft"
-    ),
+CONCEPTS = {
+    "latitude": "lati plat breite breitengrad bredde breddegrad breddgrad latitud latitudine breedtegraad breedte",
+    "longitude": "lon longi plon lng laenge laengengrad laengdgrad lengde lengdegrad lengtegraad lengte longitud "
+    "longitudine",
+    "north": "northing nord nordwert hochwert norte noord",
+    "east": "easting ost oest oestlig este leste oost rechtswert",
+    "pos": "position posicion posisjon posizione posicao positie lage stand stellung stilling ausschlag utslag",
+    "angle": "ang angulo angolo winkel vinkel hoek",
+    "direction": "dir direccion direzione direcao richtung richting retning riktning",
+    "heading": "hdg hdt hehdt head cap koers rumbo rumo rwk",
+    "prow": "proa prua prora stevn staev aproamento",
+    "course": "kurs",
+    "track": "route rotta derrota bahn",
+    "gyro": "kreisel",
+    "compass": "kompass kompas compas bussola aguja",
+    "magnetic": "mag magnet magnetisch magnetique magnetico magnetisk",
+    "steered": "steuer styrt styret styrd",
+    "ground": "grund grunn bunden fond fondo fundo sol grond",
+    "over": "ueber ue sobre",
+    "through": "durch durchs gjennom door genom gennem",
+    "water": "wasser vann vannet vand vatten eau agua acqua",
+    "speed": "vel velocity velocities spd geschwindigkeit geschw hastighet hastighed fart fahrt vaart vitesse "
+    "velocidad velocidade velocita snelheid",
+    "logg": "loch corredera solcometro",
+    "surge": "jag cavalement",
+    "sway": "svai embardee",
+    "ahead": "avance avanzo avant axiale voraus",
+    "fwd": "forward",
+    "long": "laengs langs langskips laengskepps langskepps langsscheepse longitudinal longitudinale longit",
+    "trans": "quer tvers tvaers tverr tverrskips tvaerskepps dwars dwarsscheepse transversal transversale "
+    "trasversale transverse transv laterale athwart",
+    "lat": "lateral",
+    "drift": "deriva scarroccio derive",
+    "turn": "dreh sving svinge wende draai dreie drei dreje giration giro accostata virata rotasjons bocht",
+    "yaw": "gier gir giring girings lacet guinada imbardata",
+    "rate": "taux razon regimen rateo taxa",
+    "roll": "heel kraengung kraengungs rull rullning krengning krengnings krenge krangning krangnings gite roulis "
+    "escora balance sbandamento rollio slagzij helling rol slingering schlagseite",
+    "trim": "trimm tangage assiette cabeceo beccheggio assetto nick stampf",
+    "wind": "vind vent viento vento",
+    "true": "vrai vraie vero vera verdadero sann wahr wahrer ware",
+    "relative": "rel relatif relativo relativa relativer relativ app apparent apparente aparente scheinbar "
+    "scheinbarer schijnbare",
+    "rudder": "rud rudders ruder ror roer roder timon timone leme barre barra gouvernail safran pala",
+    "azimuth": "azi azimut azimutale azimute asimut azipod schottel srp asd gondel ruderpropeller",
+    "thruster": "thr thrusters strahler propulsor propulseur",
+    "propeller": "prop propell propel helice elica schroef schrauben schraube",
+    "shaft": "arbre eje asse aksel axel welle wellen",
+    "motor": "moteur motore",
+    "rpm": "rps revs rev revolutions revoluciones umdrehungen omdreininger omdreinings omdrejninger omdrejnings "
+    "tours astoerental giri vueltas toeren tur varv turns regime rotacoes",
+    "number": "zahl tall tal",
+    "cpp": "steigung stigning spoed paso passo",
+    "force": "kraft kracht styrke staerke",
+    "thrust": "schub skyve skyvekraft poussee empuje spinta stuw",
+    "torque": "drehmoment dreiemoment akselmoment couple coppia koppel",
+    "moment": "momento",
+    "power": "puissance potencia potenza vermogen leistung effekt",
+    "fuel": "verbrauch kraftstoff consommation carburant consumo combustible carburante brandstof drivstoff forbruk",
+    "depth": "profondeur profundidad profundidade sonda profondita diepte dybde djup tiefe echolot ekkolodd sounder",
+    "draft": "draught tirant calado pescaggio immersione tiefgang tauchung",
+    "temp": "temperature temperatura temperatuur temperatur",
+    "battery": "batterie bateria batteria",
+    "pressure": "trykk druck pression",
+    "heave": "hiv pilonnement arfada sussulto",
+    "pump": "pumps pumpe pompe bomba pomp",
+    "ship": "schiffs skips navire buque nave",
+    "bow": "etrave baug",
+    "deg": "degrees",
 }
-"""Meaning -> phrases, parts of a name separated by blanks, without accents. The names of `SIGNALS` count, too."""
+"""Concept -> words for it in ten languages."""
+PHRASES: dict[str, str] = {
+    "latitude": "lat, latitude, phi gps",
+    "longitude": "long, longitude, lambda, lambda gps",
+    "north": "n, north, x north, y north, x 0, x n, x ned, x earth, eta 1, x e, utm n, utm north, utm y, xn, ned n, "
+    "ned north, delta north, dist north",
+    "east": "e, east, x east, y east, est, y 0, y n, y ned, y earth, eta 2, y e, utm e, utm east, utm x, ye, ned e, "
+    "ned east, delta east, dist east",
+    "x": "x, xpos, posx, x coordinate, enu x",
+    "y": "y, ypos, posy, y coordinate, enu y",
+    "psi": "psi, heading, gyro, compass, yaw, yaw 0, prow, bow angle, bow direction, ahead course, ahead direction, "
+    "eta 3, eta 6, theta z, course, steered course, rw course",
+    "speed": "speed, speed over ground, speed ground, sog, u, v, vg, v g, fug, fueg, uog, vog, fog, speed og, abs "
+    "speed, total speed",
+    "course": "course, course over ground, course ground, heading over ground, heading ground, cog, crs, track, "
+    "track angle, track over ground, track ground, chi, kueg, kug, kog, tmg, course og, course made good, track made "
+    "good, beholden course, heading efectivo",
+    "u": "u, vx, surge, surge speed, long speed, fwd speed, ahead speed, x speed, u speed, v x, v long, v fwd, v "
+    "surge, nu 1, x dot, u body, linear x",
+    "v": "v, vy, sway, sway speed, trans speed, lat speed, drift speed, starboard speed, stbd speed, y speed, v "
+    "speed, v y, v trans, v lat, v stbd, v sway, nu 2, y dot, v body, linear y",
+    "velocity_north": "vn, vx, v n, v north, north speed, n speed, ned n speed, enu y speed, x speed, v x, x dot",
+    "velocity_east": "ve, vy, v e, v east, east speed, est speed, e speed, ned e speed, enu x speed, y speed, v y, y "
+    "dot",
+    "r": "r, rot, turn, turn rate, turn speed, yaw rate, yaw speed, heading rate, gyro rate, gyro z, w z, omega z, "
+    "psi dot, yaw dot, gyro, nu 3, nu 6, angle speed z, angular speed z, angular z, d psi, turn zeiger",
+    "phi": "phi, roll, eta 4, slag side, trans neigung",
+    "theta": "theta, pitch, trim, stamp, eta 5, long neigung",
+    "p": "p, roll rate, nu 4, gyro x, omega x",
+    "q": "q, pitch rate, nu 5, gyro y, omega y",
+    "V_w": "wind, wind speed, wind force, tws, aws, v w, v wind",
+    "beta_w": "wind direction, wind angle, wind from, twd, twa, awa, beta w, gamma w",
+    "delta": "delta, rudder, rsa, helm, dr, d r, delta r, flap angle, steering angle, steering gear angle",
+    "alpha": "alpha, alpha t, azimuth, pod, outboard, z drive, thruster angle, thruster direction, thruster "
+    "orientation, tilt angle, thrust angle, nozzle angle, drive angle, stern drive angle, sterndrive angle, zdrive "
+    "angle, jet angle, waterjet angle",
+    "n": "n, rpm, shaft, propeller, engine, shaft speed, propeller speed, engine speed, motor speed, thruster speed, "
+    "rotation speed, turn number, n p, erpm, e rpm, electrical rpm, electric rpm, elec rpm",
+    "pitch": "cpp, propeller pitch, propeller cpp, propeller pas, pitch ratio, p d",
+    "thrust": "thrust, t n, t propeller, thrust p",
+    "torque": "torque, q, turn moment, vrid moment, shaft moment, par motor, par shaft, par propeller",
+    "normal_force": "rudder force, normal force, f n, fn",
+}
+"""Meaning -> phrases of concepts in any order. The names of `SIGNALS` count, too."""
+BESIDE = {
+    "psi": "angle direction course heading yaw gyro compass magnetic",
+    **dict.fromkeys(("r", "phi", "theta"), "angle"),
+    "beta_w": "angle direction",
+    "delta": "angle",
+    "alpha": "angle direction steering azimuth thruster pod",
+    "n": "shaft propeller engine motor main me thruster pod azimuth esc number minute as n",
+    "pitch": "pitch cpp",
+    "thrust": "propeller shaft force",
+    "torque": "propeller shaft",
+    "normal_force": "rudder normal",
+}
+"""Meaning -> concepts that say nothing else where they stand beside one of its phrases."""
 OTHERS = (
-    "stamp secs, stamp nsec, stamp nsecs, stamp nanosec, "
-    "battery voltage, sat, ukc, under keel clearance, wave probe, wave gauge, vitesse surface, vitesse eau, "
-    "vitesse loch, loch, velocidad corredera, corredera, velocidad superficie, velocita acqua, solcometro, log "
-    "snelheid, snelheid door water, vaart door water, fart gennem vand, fart genom vatten, fart gjennom vannet, "
-    "logg fart, logg, fahrt durch wasser, log geschwindigkeit, water speed, momento, puissance, potencia, "
-    "potenza, vermogen, wellen leistung, motor leistung, engine load, kw, verbrauch, kraftstoff, consommation, "
-    "carburant, consumo, combustible, carburante, brandstof, drivstoff, forbruk, fuel rack, rack, profondeur, "
-    "profundidad, sonda, profondita, diepte, vann dybde, djup, tiefe, echolot, ekkolodd, sounder, tirant eau, "
-    "tirant, calado, pescaggio, immersione, diep gang, temperatura, temperatuur, temperature eau, bow thruster, "
-    "stern thruster, elica prua, helice proa, bow thruster power, pilonnement, arfada, sussulto, tauch bewegung, "
-    "rudder pump, rudder pumps, steering pump, steering gear pump, ruder pumpe, pompe barre, bomba timon, roer "
-    "pomp, ror pumpe, rudder motor, rudder limit, rudder torque, ruder moment, pump, pumpe, pompe, drift angle, "
-    "drift winkel, derive, marker, mark, event, sample, cpu load, cpu, disk, battery, batterie, bateria, "
-    "lufttrykk, luft druck, pression, sea state, autopilot, stw, log speed, speed log, doppler log, speed through "
-    "water, v log, vbw, log spd, fahrt durchs wasser, fdw, fart gjennom vann, power, shaft power, leistung, "
-    "effekt, moment, fuel, fuel rate, fuel flow, depth, water depth, wasser tiefe, dybde, draft, draught, draft "
-    "fwd, draft aft, draught aft, draught fwd, tiefgang, tauchung, temp, temperature, air temp, temperatur, water "
-    "temp, hdop, pdop, vdop, num sat, nsat, sats, satellites, heave, hiv, acc, acc x, acc y, acc z, acceleration, "
-    "a x, a y, a z, pressure, humidity, voltage, current, set, drift, load, wave, wave height, height, altitude, "
-    "alt, age, quality, status, mode, alarm, xte, cross track error, dist, distance, waypoint, index, row, count, "
-    "id, no, nr, tunnel thruster, roll acc, pitch acc, x force, y force, variation, deviation, magnetic "
-    "variation, geoid, force, mass, current speed, current direction, z, depth m, engine torque, ae rpm, aux "
-    "engine rpm, auxiliary engine rpm, generator rpm"
+    "stamp secs, stamp nsec, stamp nsecs, stamp nanosec, battery, battery voltage, voltage, current, sat, sats, "
+    "satellites, num sat, nsat, ukc, under keel clearance, wave, wave probe, wave gauge, wave height, surface speed, "
+    "superficie speed, water speed, speed through water, stw, vbw, fdw, v log, log speed, logg, logg speed, doppler "
+    "log, moment, torque rudder, moment rudder, power, bow thruster power, shaft power, motor power, engine load, "
+    "engine torque, kw, load, fuel, fuel rate, fuel flow, rack, fuel rack, depth, water depth, depth m, draft, draft "
+    "fwd, draft aft, draft water, diep gang, temp, air temp, water temp, bow thruster, stern thruster, tunnel "
+    "thruster, propeller prow, heave, tauch bewegung, pump, rudder pump, steering pump, steering gear pump, rudder "
+    "motor, rudder limit, drift, drift angle, set, marker, mark, event, sample, cpu, cpu load, disk, pressure, "
+    "lufttrykk, humidity, sea state, autopilot, hdop, pdop, vdop, acc, acc x, acc y, acc z, acceleration, a x, a y, "
+    "a z, roll acc, pitch acc, x force, y force, force, mass, height, altitude, alt, z, age, quality, status, mode, "
+    "alarm, xte, cross track error, dist, distance, waypoint, index, row, count, id, no, nr, variation, magnetic "
+    "variation, deviation, geoid, current speed, current direction, ae rpm, aux engine rpm, auxiliary engine rpm, "
+    "generator rpm"
 )
 """Phrases of columns that no dataset takes."""
 ORDERS = frozenset(
@@ -210,28 +161,22 @@ ORDERS = frozenset(
         "befehl c cmd command commanded d demand des desired goal oensket onsket ord order ordered ordre ref "
         "reference req request set setpoint setpunkt setting soll sp target want wanted vorgabe sollwert consigne "
         "commande ordonne ordonnee demande demandee orden ordenado ordenada consigna mando comandado comando "
-        "comandato comandata ordine ordinato ordinata setpunt gewenst gewenste bevel satt bestilt kommando kommandert "
-        "kommanderet beordret oenskad boervaerde stellbefehl"
+        "comandato comandata ordine ordinato ordinata setpunt gewenst gewenste bevel satt bestilt kommando "
+        "kommandert kommanderet beordret oenskad boervaerde stellbefehl"
     ).split()
 )
 """Parts that say what is ordered, not what is."""
-WIND_WORDS = {
-    "true": "true tws twd vrai vero verdadero real reale ware wahr wahrer sann",
-    "apparent": "aws awa app apparent rel relative relatif relativo apparente aparente scheinbar scheinbarer "
-    "schijnbare relativ",
-}
+WIND_WORDS = {"true": {"true", "tws", "twd", "real", "reale"}, "apparent": {"aws", "awa", "relative"}}
 """Parts that say which wind a column has. `twa` does not: it is the true wind, from the bow."""
 SOURCES = frozenset(
     (
-        "attitude field header msg orientation pose quat quaternion twist "
-        "act actual answer apparent ahrs angle avg data deg dgnss dgps est estimated fb feedback filt filtered gga "
-        "gnss gpgga gprmc gps ground imu ins ist m mean meas measured measurement mru nav navigation odom of own pos "
-        "posicion posisjon position raw rel response rtk sensor ship signal sim standort t the true val value vessel "
-        "vtg wert gemessen istwert rueckmeldung rechtweisend reel reelle mesure mesuree effectif retour vrai vraie "
-        "medido medida real efectivo misurato misurata effettivo reale vero vera verdadero gemeten werkelijk ware "
-        "maalt virkelig faktisk tilbakemelding sann aervaerde wahr wahrer relatif relativo relativa relativer "
-        "apparente aparente scheinbar scheinbarer schijnbare relativ de du des le la les el del della di van der den "
-        "het al sul sur"
+        "attitude field header local msg orientation pose quat quaternion twist act actual answer ahrs avg data deg "
+        "dgnss dgps est estimated fb feedback filt filtered geogr gga gnss gpgga gprmc gps imu ins ist m mean meas "
+        "measured measurement mru nav navigation odom of own pos raw relative response rtk sensor ship signal sim "
+        "standort t the true val value vehicle vessel voorliggende vtg wert gemessen istwert rueckmeldung "
+        "rechtweisend reel reelle mesure mesuree effectif retour medido medida real efectivo misurato misurata "
+        "effettivo reale gemeten werkelijk maalt virkelig faktisk tilbakemelding aervaerde ligne de du des do da no "
+        "le la les el del della di van der den het al sul sur"
     ).split()
 )
 """Parts that say where a value comes from, and nothing of what it is."""
@@ -243,26 +188,25 @@ UNIT_PARTS = frozenset(
 )
 """Parts that are a unit at the end of a name."""
 SIDE_WORDS = {
-    "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|bd",
-    "starboard": "starboard|stbd|sb|tri|er|stb|styrbord|steuerbord|s|strbd|right|star|tribord|trib|td|tb|"
-    "estribor|dritta|dx|stuurboord|rechts|droite",
+    "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|"
+    "bd|bombordo",
+    "starboard": "starboard|stbd|sb|tri|er|stb|styrbord|steuerbord|s|strbd|right|star|tribord|trib|td|tb|estribor|"
+    "dritta|dx|stuurboord|rechts|droite|be|estibordo",
     "stern": "stern",
     "bow": "bow",
     "fore": "fore|fwd",
     "aft": "aft",
     "main": "main",
 }
-MAGNETIC = frozenset(
-    "mag magnet magnetic magnetisch magnetique magnetico magnetisk compass compas kompass aguja bussola".split()
-)
+MAGNETIC = frozenset(["magnetic", "compass"])
 """Parts that say that a heading is that of a magnetic compass."""
-NOT_MAGNETIC = frozenset("gyro kreisel sat satellite gps gnss rtk fog".split())
+NOT_MAGNETIC = frozenset("gyro sat satellite gps gnss rtk fog".split())
 """Parts that say that a compass is another one."""
 RUN_WORDS = frozenset(
     (
         "run runs test trial trials versuch lauf messfahrt messlauf essai essais passe prueba ensayo corrida prova "
-        "corsa proef proefvaart forsoek forsok kjoering koersel koring manoeuvre maneuver manoever manoevre "
-        "maniobra manovra manoeuver experiment exp case rec recording sequence leg"
+        "corsa proef proefvaart forsoek forsok kjoering koersel koring manoeuvre maneuver manoever manoevre maniobra "
+        "manovra manoeuver experiment exp case rec recording sequence leg"
     ).split()
 )
 """Parts that say that a column holds the run."""
@@ -272,20 +216,6 @@ RUN_NUMBERS = frozenset(
 _LETTERS = {"ψ": "psi", "δ": "delta", "φ": "phi", "ϕ": "phi", "θ": "theta", "χ": "chi", "α": "alpha", "ω": "omega"}
 _LETTERS |= {"β": "beta", "ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "Ψ": "psi"}
 _LETTERS |= {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "Ø": "Oe", "Å": "Aa", "λ": "lambda", "°": " deg "}
-SYNONYMS = {"velocity": "vel", "position": "pos", "pos": "pos", "longitudinal": "long", "transversal": "trans"}
-SYNONYMS |= {"longitudinale": "long", "transversale": "trans", "propulseur": "thruster"}
-SYNONYMS |= {
-    "etrave": "bow",
-    "transv": "trans",
-    "longit": "long",
-    "thr": "thruster",
-    "thrusters": "thruster",
-    "strahler": "thruster",
-    "propulsor": "thruster",
-}
-SYNONYMS |= {"geschw": "geschwindigkeit"}
-SYNONYMS |= {"rps": "rpm"}  # the unit is read from the name itself
-SYNONYMS |= {"transverse": "trans", "lateral": "lat", "forward": "fwd", "velocities": "vel", "degrees": "deg"}
 TRANSLATED = {
     "latitude": "緯度 纬度 위도 широта",
     "longitude": "経度 經度 经度 경도 долгота",
@@ -350,6 +280,7 @@ WHOLE = dict.fromkeys(
     ("bow", "thruster"),
 )
 WHOLE |= dict.fromkeys(("heckstrahler", "heckstrahlruder", "hekschroef", "hekkpropell"), ("stern", "thruster"))
+WHOLE |= {"propellerpm": ("propeller", "rpm")}
 """Words that are cut into parts of another language."""
 _OF_SHAFT = re.compile(rf"k?({UNIT_WORDS['rpm']})|rps|rev/s")
 """Units of a shaft speed, in lower case, that no other quantity has."""
@@ -364,6 +295,7 @@ NO_VALUE = re.compile(
 )
 """What logs write in a cell without a value, in lower case."""
 LONGEST_WORD = 80  # letters: a longer one is not cut
+_TYPE = re.compile(r"^(?:lr|[a-z])(?=[A-Z]\w)")
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
 
 
@@ -394,7 +326,12 @@ def name_parts(name: str) -> tuple[str, ...]:
         for word in whole
         for part in ([word] if word.lower() in _known_words() | UNIT_PARTS else _EDGE.split(word.replace("StB", "Stb")))
     ]
-    return tuple(SYNONYMS.get(part, part) for word in words for part in _split_word(word))
+    return tuple(_concept_of_word().get(part, part) for word in words for part in _split_word(word))
+
+
+@cache
+def _concept_of_word() -> dict[str, str]:
+    return {word: concept for concept, words in CONCEPTS.items() for word in words.split()}
 
 
 @cache
@@ -445,15 +382,15 @@ def is_note(text: str) -> bool:
 def wind_kind(name: str) -> str:
     """Whether the name of a column of wind says `true` or `apparent`; empty where it says neither, or both."""
     parts = set(name_parts(name))
-    kinds = [kind for kind, words in WIND_WORDS.items() if parts & set(words.split())]
+    kinds = [kind for kind, words in WIND_WORDS.items() if parts & words]
     return kinds[0] if len(kinds) == 1 else ""
 
 
 @cache
 def _known_words() -> frozenset[str]:
-    phrases = [*PHRASES.values(), OTHERS]
-    words = {word for phrase in phrases for word in phrase.replace(",", " ").split()}
-    return frozenset(word for word in words | ORDERS | SOURCES | RUN_WORDS | set(SYNONYMS) if len(word) > 2)
+    phrases = " ".join([*PHRASES.values(), OTHERS, *CONCEPTS, *CONCEPTS.values()])
+    words = {*phrases.replace(",", " ").split()}
+    return frozenset(word for word in words | ORDERS | SOURCES | RUN_WORDS if len(word) > 2)
 
 
 @cache
@@ -476,11 +413,11 @@ ENGINES = frozenset("engine engines motor motors moteur moteurs motore motori me
 
 
 @cache
-def _meaning_phrases() -> dict[str, tuple[tuple[str, ...], ...]]:
-    def cut(text: str) -> tuple[tuple[str, ...], ...]:
-        return tuple(tuple(SYNONYMS.get(word, word) for word in phrase.split()) for phrase in text.split(","))
-
-    return {meaning: cut(text) for meaning, text in PHRASES.items()} | {"": cut(OTHERS)}
+def _meaning_phrases() -> dict[str, tuple[frozenset[str], ...]]:
+    return {
+        meaning: tuple(frozenset(phrase.split()) for phrase in text.split(","))
+        for meaning, text in {**PHRASES, "": OTHERS}.items()
+    }
 
 
 def is_electrical(name: str) -> bool:
@@ -515,7 +452,7 @@ def is_run(name: str) -> bool:
 
 def is_magnetic(name: str) -> bool:
     """Whether a name says that a heading is that of a magnetic compass, in brackets, too: Hdg (mag), Hdg [deg M]."""
-    words = {word for unit in units_in_name(name) for word in re.split(r"[^a-z]+", unit.lower())} | {*name_parts(name)}
+    words = {word for text in (name, *units_in_name(name)) for word in name_parts(text)}
     if words & NOT_MAGNETIC:
         return False
     return bool(words & MAGNETIC or re.search(r"(deg|°) ?\(?M\b", name))
@@ -558,18 +495,28 @@ def number_in_name(name: str) -> int | None:
 
 @cache
 def meaning_scores(name: str) -> dict[str, float]:
-    """How well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use."""
+    """How well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use.
+
+    A type before the name, as `f` and `lr` of `fPosN` and `lrSpeed` in controllers, says nothing.
+    """
+    best, bare = _scores_of_name(name), _TYPE.sub("", name)
+    scores = _scores_of_name(bare) if bare != name else {}
+    clear = name.startswith(("f", "lr")) or max(scores.values(), default=0.0) > max(best.values(), default=0.0) + 0.05
+    return scores if scores and clear else best
+
+
+def _scores_of_name(name: str) -> dict[str, float]:
     parts = list(name_parts(name))
     order = is_order(name)
-    aside = (
-        {word for words in SIDE_WORDS.values() for word in words.split("|")} | SOURCES | (ORDERS if order else set())
-    )
+    sides = {word for words in SIDE_WORDS.values() for word in words.split("|")}
+    aside = sides | SOURCES | (ORDERS if order else set())
     while len(parts) > 1 and parts[-1] in UNIT_PARTS:
         parts.pop()
     content = [part for part in parts if part not in aside and not part.isdigit()]
     meanings: dict[str, float] = {}
     for meaning, phrases in _meaning_phrases().items():
-        best = max((_phrase_share(phrase, parts, content, aside) for phrase in phrases), default=0.0)
+        beside = {*BESIDE.get(meaning, "").split()} & {*parts}
+        best = max((_phrase_share(phrase, beside, parts, content, aside) for phrase in phrases), default=0.0)
         row = SIGNALS.get(meaning)
         if order and row is not None and row.role != "command":
             best = 0.0
@@ -588,12 +535,13 @@ def meaning_scores(name: str) -> dict[str, float]:
     return meanings
 
 
-def _phrase_share(phrase: tuple[str, ...], parts: list[str], content: list[str], aside: set[str]) -> float:
-    """The share of the letters of a name that a phrase explains; 0 if the name lacks a word of it."""
-    if not set(phrase) <= set(parts):
+def _phrase_share(
+    phrase: frozenset[str], beside: set[str], parts: list[str], content: list[str], aside: set[str]
+) -> float:
+    """The share of the letters of a name that a phrase and words beside it explain; 0 if it lacks a word."""
+    if not phrase <= {*parts}:
         return 0.0
-    left = [part for part in content if part not in phrase]
-    letters = sum(len(word) for word in phrase)
-    extra = sum(len(part) for part in left)
-    known_aside = 0.02 * sum(part in aside and part not in phrase for part in parts)
+    letters = sum(map(len, phrase | beside))
+    extra = sum(len(part) for part in content if part not in phrase | beside)
+    known_aside = 0.02 * sum(part in aside and part not in phrase | beside for part in parts)
     return letters / (letters + extra) - known_aside

@@ -102,3 +102,18 @@ def test_a_file_of_another_kind_is_named(kind: str, tmp_path: Path) -> None:
     asked = [one.sentence for one in guess(tmp_path).questions if "in file " in one.sentence]
     assert len(asked) == (kind != "none")
     assert all(f"in file {odd + 1} of 5" in sentence and words in sentence for sentence in asked)
+
+
+@pytest.mark.parametrize("files", [2, 5])
+def test_a_file_with_heading_and_course_exchanged_is_named(files: int, tmp_path: Path) -> None:
+    """Its heading was the course, and its drift of the other sign, without a word."""
+    sway = np.radians(CLEAN["psi"]) + np.arctan2(CLEAN["v"], CLEAN["u"])
+    log = CLEAN.assign(cog=np.degrees(sway) % 360.0, sog=np.hypot(CLEAN["u"], CLEAN["v"])).drop(columns=["u", "v"])
+    for exchanged in (False, True):
+        for number, rows in enumerate(np.array_split(np.arange(len(log)), files)):
+            part = log.iloc[rows]
+            other = part.rename(columns={"psi": "cog", "cog": "psi"})[log.columns]
+            (other if exchanged and number == files // 4 else part).to_csv(tmp_path / f"run{number}.csv", index=False)
+        asked = [one.sentence for one in guess(tmp_path).questions if "are they exchanged there" in one.sentence]
+        assert len(asked) == exchanged
+        assert all("'psi'" in sentence and "'cog'" in sentence for sentence in asked)

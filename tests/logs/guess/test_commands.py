@@ -232,3 +232,33 @@ def test_pulses_are_drafted_by_what_the_ship_does_after_them(names: tuple[str, s
     assert angle.extra["offset"] == pytest.approx(-sense * 1500.0 * 45.0 / 400.0)
     assert described(state)["propeller.n"][0] == names[1]
     assert any("dead band" in one.sentence for one in state.questions)
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("thrust_cmd", True),
+        ("motor_cmd_left", True),
+        ("throttle 1", True),
+        ("motor_temp", False),
+        ("engine load", False),
+    ],
+)
+def test_an_order_of_an_actuator_is_asked_though_its_effect_is_not_seen(name: str, taken: bool) -> None:
+    """The order of the only screw of a boat was left out without a word where wind hid what it does."""
+    state = chosen({name: np.random.default_rng(4).uniform(0.0, 1.0, len(T))})
+    assert [one.source for one in state.suggestions if one.name.endswith(".n")] == [name] * taken
+    assert any(repr(name) in one.sentence and "n" in one.about for one in state.questions) == taken
+
+
+@pytest.mark.parametrize(
+    ("shaft", "asked"), [(np.abs(RPM), False), (RPM, False), (np.where(T % 40 < 20, 90.0, 60.0), True)]
+)
+def test_a_shaft_that_hides_its_turns_astern_is_asked(shaft: np.ndarray, asked: bool) -> None:
+    """The ship goes astern in the last case: its shaft was drafted as if it drove the ship ahead, without a word."""
+    state = state_with_pose({"rpm": shaft})
+    state.r = R
+    if asked:
+        state.position = np.where(T.mean() > T, state.position, 2 * state.position[len(T) // 2] - state.position)
+    choose_commands(state)
+    assert any("says its sense" in one.sentence for one in state.questions) == asked

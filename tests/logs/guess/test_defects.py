@@ -160,16 +160,6 @@ def test_a_repair_is_what_would_undo_the_defect(tmp_path: Path) -> None:
     assert (arm.repair["x"], arm.repair["y"]) == (pytest.approx(9.0, abs=0.5), pytest.approx(-3.0, abs=0.5))
 
 
-@pytest.mark.parametrize(("forward", "cut"), [(True, False), (True, True)])
-def test_a_clock_that_was_set_forward_is_asked(forward: bool, cut: bool, tmp_path: Path) -> None:
-    """The ship went on as from row to row, so no time is missing; not where rows are."""
-    log = CLEAN.drop(CLEAN.index[500:540]) if cut else CLEAN.copy()
-    log.loc[log["time"] >= 270.0, "time"] += 20.0 if forward else 0.0
-    asked = [one.sentence for one in guess_of(tmp_path, log).questions if "was the clock set forward" in one.sentence]
-    assert len(asked) == (forward and not cut)
-    assert all("after t = 269.5 comes t = 290" in one for one in asked)
-
-
 def test_a_log_with_drawn_spikes_is_healed_by_its_draft(tmp_path: Path) -> None:
     """Imported by its draft, without an edit, it is the clean log imported by the same draft."""
     random = np.random.default_rng(0)

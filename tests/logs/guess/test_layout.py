@@ -211,14 +211,3 @@ def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
     sniffed = sniff(tmp_path, table, sep=";", decimal=decimal, float_format="%.3f")
     assert "thousands" not in sniffed.form
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
-
-
-@pytest.mark.parametrize("more", ["", ",192"])
-def test_a_row_for_each_value_is_named(more: str, tmp_path: Path) -> None:
-    """As historians write: what the value is stands in a cell beside it."""
-    tags = ("GPS1.LAT", "GPS1.LON", "GYRO1.HDG", "STG.RUDDER")
-    rows = [f"2024-05-14 08:00:{t:02},{tag},{t + k / 7:.3f}{more}" for t in range(50) for k, tag in enumerate(tags)]
-    with pytest.raises(
-        DataError, match=r"a row for each value, called 'GPS1.LAT', 'GPS1.LON', .*: write a row for each"
-    ):
-        recognise_log(log_of(tmp_path, [f"Timestamp,Tag,Value{',Quality' * bool(more)}", *rows]))

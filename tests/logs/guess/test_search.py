@@ -192,9 +192,9 @@ def _on_earth() -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(
     ("more", "why"),
     [
-        ({"u": -SURGE, "v": -SWAY}, "'u' along the heading gives the track"),
-        ({"rpm": -60.0 - SURGE}, "'rpm' is negative"),
-        ({"rpm": -60.0 - SURGE, "cog": COURSE, "sog": np.hypot(SURGE, SWAY)}, "'rpm' is negative"),
+        ({"u": -SURGE, "v": -SWAY}, "the ship goes astern"),
+        ({"rpm": -60.0 - SURGE}, "the ship goes astern"),
+        ({"rpm": -60.0 - SURGE, "cog": COURSE, "sog": np.hypot(SURGE, SWAY)}, "the ship goes astern"),
     ],
 )
 @pytest.mark.parametrize("place", [{"N": NORTH, "E": EAST}, _on_earth()], ids=["plane", "Earth"])
@@ -239,6 +239,24 @@ def test_a_course_is_no_heading_beside_a_column_named_as_one(share: float) -> No
     words = {"ground_course": course, "ground_speed": np.abs(ground), "AHR2.Yaw": DEG % 360.0, "RATE.Y": rate}
     drafted = {one.name: one.source for one in chosen({**place, **words}).suggestions}
     assert (drafted["psi"], drafted["course"], drafted["r"]) == ("AHR2.Yaw", "ground_course", "RATE.Y")
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0, 2.0])
+def test_velocities_show_the_heading_of_a_ship_that_drifts(share: float) -> None:
+    """In wind a boat goes to any side: a false heading kept to the track, and the true frame was refused."""
+    t, stream = T, share * float(np.median(SURGE)) * np.exp(2.0j)
+    body = SURGE + 1j * SWAY + stream * np.exp(-1j * PSI)
+    place = {"pose.position.x": EAST + stream.imag * t, "pose.position.y": NORTH + stream.real * t}
+    twist = {"twist.linear.x": body.real, "twist.linear.y": -body.imag}
+    columns = {**place, "orientation yaw": np.pi / 2 - PSI, **twist, "twist.angular.z": -LOG["r"].to_numpy()}
+    state = state_of(columns, t)
+    choose_motion(state, FILE, "ros")
+    np.testing.assert_allclose(np.exp(1j * state.psi), np.exp(1j * PSI), atol=1e-6)
+    drafted = {one.name: (one.source, one.extra.get("sign", 1)) for one in state.suggestions}
+    assert drafted["u"] == ("twist.linear.x", 1)
+    assert drafted["v"] == ("twist.linear.y", -1)
+    assert drafted["r"] == ("twist.angular.z", -1)
+    assert not [one for one in state.questions if "agree badly" in one.sentence]
 
 
 def test_the_yaw_of_a_quaternion_is_no_place() -> None:

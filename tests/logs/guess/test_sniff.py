@@ -53,7 +53,7 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
         ),
         (
             text(table=TABLE.assign(time=TABLE["time"].where(T != 1.0), N=1.0, psi=1.0)).encode(),
-            "'time' has no value in row 3",
+            "'time' holds '' in row 3, no number or time",
         ),
         (text(table=TABLE.assign(time=1.0, N=1.0, psi=1.0).rename(columns={"time": "x"})).encode(), "none rises"),
     ],

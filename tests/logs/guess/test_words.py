@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 from shipid.logs.guess.words import (
+    CONCEPTS,
     OTHERS,
     PHRASES,
     is_magnetic,
@@ -25,8 +29,8 @@ from shipid.physics.signals import SIGNALS
         ("GPS_Lat", ("gps", "lat")),
         ("ShaftRPM_port", ("shaft", "rpm", "port")),
         ("yawRate", ("yaw", "rate")),
-        ("Ruderwinkel [Grad]", ("ruder", "winkel")),
-        ("Kurs über Grund", ("kurs", "ueber", "grund")),
+        ("Ruderwinkel [Grad]", ("rudder", "angle")),
+        ("Kurs über Grund", ("course", "over", "ground")),
         ("ψ_m", ("psi", "m")),
         ("M/E RPM", ("me", "rpm")),
         ("左舷舵角（度）", ("port", "rudder", "angle")),
@@ -137,12 +141,55 @@ def test_both_sides_of_a_pair_fit_the_same(name: str, port: str, starboard: str)
     assert meaning_scores(names[0]) == meaning_scores(names[1])
 
 
-def test_every_phrase_fits_its_meaning() -> None:
-    for meaning, phrases in {**PHRASES, "": OTHERS}.items():
-        for phrase in phrases.split(", "):
+TABLE = {meaning: phrases.split(", ") for meaning, phrases in {**PHRASES, "": OTHERS}.items()}
+"""Meaning -> phrases of the table."""
+
+
+def earlier_phrases() -> dict[str, list[str]]:
+    """Meaning -> phrases, by language, of an earlier table that listed them all."""
+    blocks = re.split(r"^\[(\w+)\]$", Path(__file__).with_name("phrases.txt").read_text(encoding="utf-8"), flags=re.M)
+    return {
+        "" if meaning == "OTHERS" else meaning: re.split(r",\s+", text.strip())
+        for meaning, text in zip(blocks[1::2], blocks[2::2], strict=True)
+    }
+
+
+@pytest.mark.parametrize("table", [TABLE, earlier_phrases()], ids=["now", "earlier"])
+def test_every_phrase_fits_its_meaning(table: dict[str, list[str]]) -> None:
+    for meaning, phrases in table.items():
+        for phrase in phrases:
             taken = not meaning and SIGNALS.keys() & meaning_scores(phrase)  # a signal takes a name that had no meaning
             if not is_order(phrase) and not taken:
                 assert meaning_scores(phrase).get(meaning, 0.0) > 0.6, (meaning, phrase, meaning_scores(phrase))
+
+
+def test_a_word_says_one_concept_and_a_concept_is_not_translated() -> None:
+    words = [word for words in CONCEPTS.values() for word in words.split()]
+    assert len(words) == len({*words})
+    assert not {*words} & CONCEPTS.keys()
+
+
+@pytest.mark.parametrize("angle", ["winkel", "vinkel", "hoek", " angolo", " angle", "Ang", "_angulo"])
+@pytest.mark.parametrize(
+    ("thing", "meaning"),
+    [("Ruder", "delta"), ("TIMONE", "delta"), ("Roder", "delta"), ("thruster", "alpha"), ("azimut", "alpha")],
+)
+def test_combinations_of_languages_that_nobody_listed(thing: str, angle: str, meaning: str) -> None:
+    name = f"{thing}{angle.upper() if thing.isupper() else angle} SB"
+    scores = meaning_scores(name)
+    assert max(scores, key=lambda one: scores[one]) == meaning
+
+
+@pytest.mark.parametrize("prefix", ["f", "lr"])
+@pytest.mark.parametrize("name", ["PosN", "TrueHeading", "Speed", "YawRate", "Rudder", "ShaftSpeed", "WindDirection"])
+def test_a_type_before_a_name_says_nothing(prefix: str, name: str) -> None:
+    assert meaning_scores(prefix + name) == meaning_scores(name)
+
+
+@pytest.mark.parametrize(("name", "meaning"), [("nShaft", "n"), ("vEast", "velocity_east"), ("xEarth", "north")])
+def test_a_symbol_before_a_name_is_no_type(name: str, meaning: str) -> None:
+    scores = meaning_scores(name)
+    assert max(scores, key=lambda one: scores[one]) == meaning
 
 
 def test_a_name_that_says_nothing_fits_nothing() -> None:
@@ -222,4 +269,4 @@ def test_a_unit_that_is_spelt_out_is_that_in_brackets(spelt: str, plain: str) ->
 @pytest.mark.parametrize("name", ["temperature_s", "propeller_speed", "upper_deck", "newton", "giri_per_elica"])
 def test_other_words_with_per_are_kept(name: str) -> None:
     assert units_in_name(name) == []
-    assert "".join(name_parts(name)) == name.replace("_", "")
+    assert name_parts(name) == tuple(part for word in name.split("_") for part in name_parts(word))
