@@ -60,9 +60,9 @@ def study_file(folder: Path, families: str, more: str = "", methods: str = "") -
 def simulated_table(cut: StudyWindows, motion: bool = True) -> pd.DataFrame:
     """What a simulator makes of the tables of `study windows`: every row of `windows` over its rows of `future`."""
     tables = cut.tables()
-    windows, future, parts = tables["windows"], tables["future"], []
+    windows, future, parts = tables["windows"], dict([*tables["future"].groupby(["run", "instant"])]), []
     for _, row in windows.iterrows():
-        ahead = future[future["run"].eq(row["run"]) & future["instant"].sub(row["instant"]).abs().lt(1e-6)]
+        ahead = future[row["run"], row["instant"]]
         orders = {name: ahead[name].to_numpy()[None] for name in cut.names["orders"]}
         weather = {name: ahead[name].to_numpy()[None] for name in cut.names["wind"]}
         after = gunnerus(row[list(STATES)].to_numpy(float)[None], orders, weather, cut.windows.step)[0]
