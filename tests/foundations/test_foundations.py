@@ -16,6 +16,7 @@ from shipid.errors import ShipidError
 from shipid.predictor import Predictor
 from shipid.study import seals, store
 from shipid.study.check import check_folder
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_study
 from shipid.study.windows import windows
 from tests.cli.running import ended
@@ -146,3 +147,31 @@ def test_a_saved_predictor_takes_the_paths_of_the_physics(folder: Path) -> None:
         predictor.predict(results.test.instants())
     paths = predictor.predict(results.test.instants(), results.physics["function"])
     np.testing.assert_allclose(paths, results.paths["function+drawn-N0006-s0"], atol=1e-12)
+
+
+def test_a_study_has_the_digits_of_a_task_by_hand(tmp_path: Path) -> None:
+    """Paths that fall short by 7 % and run off, as of a user who had no other way than a Task with his own Case."""
+    families = '[[family]]\nname = "short"\npredictions = "paths.parquet"\n'
+    file = study_file(tmp_path, families, methods=METHODS.replace("memory = {error = [2.0]}", ""))
+    cut = windows(file, every=True, with_truth=True).windows
+    short = 0.93 * cut.future + 0.02 * np.arange(1, cut.horizon + 1)[:, None, None]
+    shipid.prediction_table(cut, short).to_parquet(tmp_path / "paths.parquet")
+    plan = shipid.read_plan(file)
+    run_here(plan, tmp_path / "run")
+    results, prepared = shipid.read_results(tmp_path / "run"), prepare(plan, obtain_runs(plan))
+    part, known = plan.batches[0], dict(zip(zip(cut.run, cut.t, strict=True), short.swapaxes(0, 1), strict=True))
+    mine = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(part)))
+    before, after = (
+        np.stack([known[key] for key in zip(one.run, one.t, strict=True)], axis=1) for one in (mine, prepared.test)
+    )
+    none = shipid.Physics(None, cut.horizon, cut.step)
+    for way in plan.methods[:2]:
+        folds = prepared.folds(part, mine, way.method.validation)
+        task = shipid.Task({"short": shipid.Case(none, before)}, mine, folds, prepared.commands, seed=part.seed)
+        corrector = way.method.fit(task)["short"].corrector
+        assert corrector is not None
+        error = shipid.position_error(corrector.predict(none, prepared.test.instants(), after), prepared.test.future)
+        (row,) = (row for row in results.rows if row["cell"] == part.cell("short", way.name))
+        assert row["H"] == pytest.approx(error.mean(), rel=1e-9)
+        assert row["A"] == pytest.approx(shipid.position_error(after, prepared.test.future).mean(), rel=1e-9)
+        assert row["H"] < row["A"] / 2
