@@ -146,7 +146,7 @@ def check_keys(frame: pd.DataFrame, wanted: pd.MultiIndex, file: Path, option: s
     for rows, fault in (
         (given[:0] if option else given[~given.isin(wanted)], f"are none of the test: {listing}"),
         (given[given.duplicated()], "are there twice: give each once"),
-        (wanted.difference(given), f"are missing: {listing}"),
+        (wanted.difference(given), f"are missing{f': {listing}' if option else ''}"),
     ):
         for run, instant, ahead in rows[:1]:
             where = f"run {run!r}, instant {instant:g} s, ahead {ahead:g} s"
