@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -34,6 +34,7 @@ class InputLayout:
     now : measured at the instant. reached : actuators that lag behind their orders. past : entries of each of
     `num_past` rows, the oldest first, 1 ... num_past steps before the instant; x, y are positions in the frame of the
     instant. planned : commands of each of `horizon` rows. estimates : of the observer.
+    physics : x, y of each of `horizon` rows of the path of the physics, where a simulator gives it.
     """
 
     now: tuple[str, ...]
@@ -44,11 +45,13 @@ class InputLayout:
     horizon: int
     estimates: tuple[str, ...]
     commands: tuple[str, ...]
+    physics: tuple[str, ...] = ()
 
     @property
     def sizes(self) -> dict[str, int]:
         """Entries of each input."""
-        return {
+        given = {"physics": self.horizon * len(self.physics)} if self.physics else {}
+        return given | {
             "now": len(self.now),
             "reached": len(self.reached),
             "past": self.num_past * len(self.past),
@@ -172,6 +175,11 @@ class SymbolicPhysics(Physics):
         return call
 
 
+def symbolic_physics(physics: Physics) -> SymbolicPhysics:
+    """The physics on symbols; that of a simulator has no vessel, as its path is an input."""
+    return SymbolicPhysics(**{one.name: getattr(physics, one.name) for one in fields(Physics)})
+
+
 class PredictorInputs:
     """Symbols of the inputs of a predictor.
 
@@ -179,7 +187,7 @@ class PredictorInputs:
     """
 
     def __init__(self, physics: Physics, names: InputLayout) -> None:
-        self.physics, self.names = SymbolicPhysics(**vars(physics)), names
+        self.physics, self.names = symbolic_physics(physics), names
         self.inputs = symbols_of(names.sizes)
         self.now = split_by_name(names.now, self.inputs["now"])
 
@@ -200,6 +208,13 @@ class PredictorInputs:
             rows_by_name(names.reached, given["reached"], 1) or None,
             estimates,
         )
+
+    def paths(self, physics: SymbolicPhysics) -> Any:
+        """Path (T, 1, 2) [m] of the physics alone; that of a simulator is an input."""
+        if not self.names.physics:
+            return physics.paths(self.instants)
+        given = ca.reshape(self.inputs["physics"], 2, self.names.horizon)
+        return ca.ArrayInterface.MX(given.T, shape=(self.names.horizon, 1, 2))
 
     @property
     def diverges(self) -> MX:

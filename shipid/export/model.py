@@ -14,13 +14,15 @@ from shipid.errors import ShipidError
 from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_band_promised
 from shipid.export.correctors import symbolic_corrector
 from shipid.export.equations import function_by_names, symbols_of
-from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs, SymbolicPhysics
+from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs, symbolic_physics
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.method import widen_range
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.novelty import alarm_inputs
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.simulated import SimulatedPhysics
 from shipid.observer import ESTIMATE_COLUMNS
 from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
@@ -72,11 +74,9 @@ class ExportModel:
                 "use fewer trees or units, larger leaves, or the method path-drawn"
             )
         known = PredictorInputs(self.physics, self.layout)
-        physics, method = SymbolicPhysics(**vars(self.predictor.physics)), self.predictor.method
+        physics, method = symbolic_physics(self.predictor.physics), self.predictor.method
         try:
-            predicted: Any = symbolic_corrector(corrector).predict(
-                physics, known.instants, physics.paths(known.instants)
-            )
+            predicted: Any = symbolic_corrector(corrector).predict(physics, known.instants, known.paths(physics))
             path = MX(predicted.reshape(physics.horizon, 2)).T
         except (
             ShipidError,
@@ -132,8 +132,8 @@ class ExportModel:
 def build_model(predictor: DeployedMethod) -> ExportModel:
     """A predictor as a model.
 
-    Its inputs are those of the physics, and what the alarm and the band look at: every input of a method is among them,
-    but for the direction of the wind.
+    Its inputs are those of the physics, or the path of a simulator, and what the alarm and the band look at: every
+    input of a method is among them, but for the direction of the wind.
     """
     physics = predictor.physics_with_force
     states, memory, orders, weather = (tuple[str, ...](),) * 4
@@ -149,8 +149,12 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
     past = (*now[len(POSITION_ENTRIES) :], "x", "y") if predictor.past else ()
     estimates = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS) if physics.observer is not None else ()
     planned = commands if predictor.commands == "known" else ()
+    given = ("x", "y") if isinstance(physics, SimulatedPhysics) else ()
+    if given and (METHODS[predictor.method].needs != "path" or predictor.inputs.memory.error):
+        words = "the physics is a simulator, which no file holds, and the method asks it for more than a path"
+        raise ShipidError(f"{words}: take one that needs the path alone, without memory.error")
     return ExportModel(
         predictor,
         physics,
-        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, commands),
+        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, commands, given),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -35,6 +35,8 @@ ESTIMATED = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS)
 REPEATED_FROM = 5_000  # steps of one rollout: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
+Needs = Literal["path", "motion", "steps", "equations"]
+"""What a method asks of the physics: its paths, u, v, r and psi along them, starts from any state, or equations."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,16 @@ class Physics:
     def with_values(self, values: Mapping[str, Any]) -> Physics:
         """Return the same physics with other numbers, dotted path -> value."""
         return self if self.vessel is None else replace(self, vessel=self.vessel.with_values(values))
+
+    @property
+    def gives(self) -> tuple[Needs, ...]:
+        """What a method may ask of it."""
+        return get_args(Needs)
+
+    @property
+    def absent(self) -> bool:
+        """Whether there is no physics, so that all paths are zero."""
+        return self.vessel is None
 
     @property
     def ship(self) -> Vessel:
