@@ -21,7 +21,7 @@ StudyName = Annotated[str, typer.Argument(help="bundled study or path of one")]
 MappingName = Annotated[str, typer.Argument(help="bundled mapping or path of one")]
 Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d")]
 Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
-Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
+Workers = Annotated[int | None, typer.Option(min=0, help="processes, 0 for this one; default one per core")]
 Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]
 Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 

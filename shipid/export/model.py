@@ -56,7 +56,8 @@ class ExportModel:
         corrector, bands = self.predictor.corrector, self.predictor.bands
         if isinstance(corrector, MeanCorrector):
             raise ShipidError("a mean over foundations cannot be exported: export the cells of its foundations")
-        if type(corrector) not in CORRECTORS:
+        write = CORRECTORS.get(type(corrector)) or getattr(corrector, "export_path", None)
+        if write is None:
             kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
             raise ShipidError(
                 f"a predictor by the method {self.predictor.method} cannot be exported; these can: {', '.join(kinds)}"
@@ -71,7 +72,7 @@ class ExportModel:
             )
         known = PredictorInputs(self.physics, self.layout)
         try:
-            path = CORRECTORS[type(corrector)](known, corrector)
+            path = write(known, corrector)
         except (LookupError, ValueError, TypeError, AttributeError, RuntimeError, AssertionError) as error:
             raise ShipidError(
                 f"the parts of the method {self.predictor.method!r} do not fit together ({error}): its file is damaged"

@@ -192,7 +192,7 @@ def stored_plan(folder: Path) -> Plan:
         remedy = "if the run is of another version, read its report.html, and run the study again into a new folder"
         if "program" in record:
             command = f"`{record['program']} study report {quote_argument(folder)}`"
-            remedy = f"open it by your script, which knows its methods and terms: {command}"
+            remedy = f"install the package, or name `--with` the file, that has its methods and terms: {command}"
         message = f"shipid {__version__} does not take it ({error.message}): {remedy}"
         raise NotTaken(message, file=file, path=error.path) from None
     except (TypeError, KeyError, AttributeError, ValueError):

@@ -1,0 +1,68 @@
+"""Water jets for shipid: a signal, a term, a method and a reader of logs, each by an entry point of the package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import casadi as ca
+import numpy as np
+import pandas as pd
+from casadi import SX
+
+from shipid.export.correctors import physics_path
+from shipid.hybrid.method import FitResult, Method, Task
+from shipid.hybrid.search import trial_row
+from shipid.hybrid.stored import StoredData
+from shipid.logs.formats import Format
+from shipid.logs.readers import LogReader
+from shipid.physics import Term
+from shipid.physics.frames import wrench_of_force
+from shipid.physics.signals import Signal
+
+THROTTLE = Signal(
+    "command", "-", "jet throttle", names=r"throttle\w*|\w+_throttle", usual=(0.2, 0.8), component="jet"
+)
+
+
+def jet(throttle: SX, *, x: Annotated[SX, "m"], F_max: Annotated[SX, "N"]) -> SX:
+    """Wrench (6) of a jet at x: X = F_max throttle |throttle|."""
+    return wrench_of_force(x, SX(0), SX(0), F_max * throttle * ca.fabs(throttle), SX(1, 1))
+
+
+JET = Term(jet)
+
+
+@dataclass(frozen=True)
+class Shift(StoredData):
+    """The mean error (T, 1, 2) [m] of the physics."""
+
+    shift: np.ndarray
+    hyperparameters: Mapping[str, float]
+    past: float = 0.0
+
+    def predict(self, physics: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG002
+        return paths + self.shift
+
+    @staticmethod
+    def export_path(known: Any, corrector: Shift) -> Any:
+        return physics_path(known, corrector) + ca.DM(corrector.shift[:, 0].T)
+
+
+class MeanError(Method):
+    """Takes the mean error of the physics over the training windows away."""
+
+    corrector: ClassVar[type[Any]] = Shift
+
+    def fit(self, task: Task) -> dict[str, FitResult]:
+        shifts = {name: missed.mean(axis=1, keepdims=True) for name, missed in task.targets.items()}
+        return {name: FitResult(Shift(one, {}), [trial_row(0, {}, 0.0, 0.0)], 0.0) for name, one in shifts.items()}
+
+
+def read_toy(file: Any, *_: Any) -> pd.DataFrame:
+    lines = file.read_text().splitlines()[1:]
+    return pd.DataFrame({name: values.split() for name, values in (line.split(": ") for line in lines)})
+
+
+TOY = LogReader(Format, read_toy, lambda _, head: {"kind": "toy"} if head.startswith(b"TOY\n") else None)
