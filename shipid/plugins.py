@@ -32,11 +32,13 @@ class Registry(dict[str, Member]):
     Iteration is over what is loaded; `in`, `get` and `[...]` know the names of installed packages, too.
 
     group : of the entry points. fault : what an object lacks to be a member, one sentence; empty for nothing.
+    check : raises ShipidError for the name of a member of a package that cannot be used.
     """
 
     def __init__(self, group: str, fault: Callable[[Any], str]) -> None:
         super().__init__()
         self.group, self.fault = group, fault
+        self.check: Callable[[str], object] = str
         self.added: set[str] = set()
         REGISTRIES[group] = self
 
@@ -56,11 +58,13 @@ class Registry(dict[str, Member]):
         try:
             member: Any = fault or entry.load()
             fault = fault or self.fault(member)
+            super().__setitem__(name, member)
+            _ = fault or self.check(name)
         except (Exception, SystemExit) as error:  # whatever the code of a package does
             fault = describe_error(error)
         if fault:
+            self.pop(name, None)
             raise ShipidError(_fault_words(entry, fault))
-        super().__setitem__(name, member)
         return super().__getitem__(name)
 
     @cached_property
@@ -79,27 +83,15 @@ class Registry(dict[str, Member]):
         """Every name, of what is loaded and of what is not."""
         return list(dict.fromkeys([*self, *self.offers]))
 
-    def get(self, name: str, default: Any = None) -> Member | Any:
+    def get(self, name: str, default: Any = None) -> Member | None:  # type: ignore[override]
         """The member of a name, or the default."""
         return self[name] if name in self else default  # noqa: SIM401 - `dict.get` loads nothing
 
-    def load(self, name: str, check: Callable[[str], object] = str) -> Member:
-        """The member that a document names. check : raises ShipidError where a new member cannot be used."""
-        if name not in self.offers or super().__contains__(name):
-            return self[name]
-        member = self[name]
-        try:
-            check(name)
-        except ShipidError as error:
-            del self[name]
-            raise ShipidError(_fault_words(self.offers[name][0], str(error))) from None
-        return member
-
-    def load_all(self, check: Callable[[str], object] = str) -> Self:
+    def load_all(self) -> Self:
         """The registry with all that packages offer; a warning, once, for each that cannot be used."""
         for name in self.names:
             try:
-                self.load(name, check)
+                self[name]
             except ShipidError as error:
                 log_warning(str(error))
         return self
@@ -136,7 +128,8 @@ def _fault_words(entry: Any, fault: str) -> str:
 
 def describe_error(error: BaseException) -> str:
     """An error of code that is not shipid's, on one line."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    kind = "" if isinstance(error, ShipidError) else f"{type(error).__name__}: "
+    return kind + " ".join(str(error).split())
 
 
 def fault_of_kind(kind: type, member: object) -> str:

@@ -46,7 +46,7 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
         raise DocumentError(f"{kind!r} is no kind of method: {method_names(kind)}", path=f"{path}.kind")
-    method: Method = parse_model(METHODS.load(kind), dict(settings), None, path)
+    method: Method = parse_model(METHODS[kind], dict(settings), None, path)
     return method
 
 

@@ -465,7 +465,7 @@ def _parse_format(raw: Any, file: Path, path: str) -> Format:
         raise DocumentError(
             f"unknown kind {kind!r}: {suggest_name(kind, READERS.names)}", file=file, path=f"{path}.kind"
         )
-    form: Format = document.parse_model(READERS.load(kind).options, raw, file, prefix=path)
+    form: Format = document.parse_model(READERS[kind].options, raw, file, prefix=path)
     return form
 
 

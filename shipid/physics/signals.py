@@ -294,8 +294,7 @@ def signal_of(name: str) -> str:
 
 def signal_row(name: str) -> Signal | None:
     """Row of a command (`port.n`) or of another signal (`u`); None for an unknown name."""
-    row: Signal | None = SIGNALS.get(signal_of(name))
-    return row
+    return SIGNALS.get(signal_of(name))
 
 
 def _row_or_unknown(name: str) -> Signal:

@@ -31,7 +31,7 @@ from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
-from shipid.plugins import add_members, added_members
+from shipid.plugins import REGISTRIES, add_members, added_members
 from shipid.study import seals, store
 from shipid.study.cells import (
     NO_ACCURACY,
@@ -119,6 +119,8 @@ def run_study(
     check_device(device)
     if scheduler is None and workers != 0:
         import_for_workers()
+    for registry in REGISTRIES.values():
+        _ = registry.offers  # says which names of packages are taken
     means = Means(workers, scheduler, device, shard)
     yield from (_run_parts if plan.parts else _run_one)(plan, folder, means)
 

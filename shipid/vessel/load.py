@@ -17,6 +17,7 @@ from shipid.arguments import as_path
 from shipid.document import Document
 from shipid.errors import DocumentError, suggest_name
 from shipid.files import open_file
+from shipid.notebooks import NotebookView
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import total_mass
@@ -43,8 +44,8 @@ LONGEST_CHAIN = 20  # documents that extend or patch one another
 MOST_BLOCK = 2.0  # m / (rho L_pp B T), as `LEAST_BLOCK`: far beyond any ship and its degraded models
 
 
-@dataclass(frozen=True)
-class Vessel:
+@dataclass(frozen=True, repr=False)
+class Vessel(NotebookView, shown=("name", "file", "length", "parameters")):
     """A checked vessel document.
 
     document : plain nested data, after any patch; not to be changed.

@@ -66,14 +66,12 @@ def split_keys(keys: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
 def check_term(key: str) -> Term:
     """The term of a key of TERMS; ShipidError, one line with its place, where its functions cannot be used."""
     term = TERMS[key]
+    split_keys((key,))
     _check_functions(key, term)
     return term
 
 
-def _check_key_and_term(key: str) -> None:
-    """ShipidError where the key of a term, or the term, cannot be used."""
-    split_keys((key,))
-    check_term(key)
+TERMS.check = check_term  # of packages: physics knows no documents
 
 
 @cache
@@ -368,10 +366,9 @@ def vessel_model(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
     Without a document it has those of all packages: its JSON schema serves editors.
     """
     if document is None:
-        TERMS.load_all(_check_key_and_term)
+        TERMS.load_all()
     for _, key, _ in () if document is None else (*term_blocks(document), *term_blocks(document, off=True)):
-        if key in TERMS:
-            TERMS.load(key, _check_key_and_term)
+        TERMS.get(key)
     return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(rows_of_role("command")))
 
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import casadi as ca
-import numpy as np
 import pandas as pd
 from casadi import SX
 
 from shipid.export.correctors import physics_path
-from shipid.hybrid.method import FitResult, Method, Task
+from shipid.hybrid.method import Array, FitResult, Method, Task
 from shipid.hybrid.search import trial_row
 from shipid.hybrid.stored import StoredData
 from shipid.logs.formats import Format
@@ -21,9 +20,7 @@ from shipid.physics import Term
 from shipid.physics.frames import wrench_of_force
 from shipid.physics.signals import Signal
 
-THROTTLE = Signal(
-    "command", "-", "jet throttle", names=r"throttle\w*|\w+_throttle", usual=(0.2, 0.8), component="jet"
-)
+THROTTLE = Signal("command", "-", "jet throttle", names=r"throttle\w*|\w+_throttle", usual=(0.2, 0.8), component="jet")
 
 
 def jet(throttle: SX, *, x: Annotated[SX, "m"], F_max: Annotated[SX, "N"]) -> SX:
@@ -38,7 +35,7 @@ JET = Term(jet)
 class Shift(StoredData):
     """The mean error (T, 1, 2) [m] of the physics."""
 
-    shift: np.ndarray
+    shift: Array
     hyperparameters: Mapping[str, float]
     past: float = 0.0
 
