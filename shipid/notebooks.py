@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from operator import attrgetter
-from typing import Any
+from textwrap import shorten
+from typing import Any, ClassVar
 
 LONGEST = 100  # characters of a value
 ROWS, COLUMNS = 12, 8  # of a table, at most
@@ -12,6 +13,8 @@ ROWS, COLUMNS = 12, 8  # of a table, at most
 
 class NotebookView:
     """Shows the attributes that `shown` names; of a table the number of rows in a line, and itself in a notebook."""
+
+    _shown: ClassVar[tuple[str, ...]]
 
     def __init_subclass__(cls, shown: tuple[str, ...]) -> None:
         cls._shown = shown
@@ -40,7 +43,7 @@ def brief_text(value: Any) -> str:
     if hasattr(value, "shape"):
         return " x ".join(map(str, value.shape))
     words = ", ".join(map(str, value)) if isinstance(value, list | tuple | dict) else str(value)
-    return words if len(words) <= LONGEST else f"{words[:LONGEST]}..."
+    return shorten(words, LONGEST, placeholder=" ...")
 
 
 def progress_bar() -> Any:

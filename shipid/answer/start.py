@@ -50,7 +50,7 @@ def run(
         for event in events(study, set, out, workers, scheduler=scheduler, device=device):
             if line := event_line(event):
                 log.info("%s", line)
-                bar.set_description_str(line)
+            bar.set_postfix_str(event.row.get("cell", event.text))
             bar.total = event.total or bar.total
             bar.update(event.done - bar.n)
             if event.kind == "end":
