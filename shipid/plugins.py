@@ -132,7 +132,7 @@ def describe_error(error: BaseException) -> str:
     return kind + " ".join(str(error).split())
 
 
-def fault_of_kind(kind: type, member: object) -> str:
+def fault_of_kind(kind: Any, member: object) -> str:
     """What an object lacks to be of a class, one sentence; empty for nothing."""
     return "" if isinstance(member, kind) else f"must be a {kind.__name__} of {kind.__module__}, not {member!r}"
 

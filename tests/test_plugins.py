@@ -23,6 +23,7 @@ from shipid.logs.readers import READERS, read_log_table
 from shipid.physics import TERMS
 from shipid.plugins import REGISTRIES, import_files, installed_entries
 from shipid.predictor import Predictor
+from shipid.study.results import read_results
 from shipid.vessel.load import check_document, load_vessel
 from shipid.vessel.schema import vessel_model
 from tests.faults.clusters import a_cluster
@@ -93,7 +94,8 @@ def study_with_jets(folder: Path) -> Path:
     (folder / "ship.toml").write_text(SHIP)
     text = TINY.read_text().replace('"gunnerus-28.9"', '"./ship.toml"')
     file = folder / "study.toml"
-    file.write_text(text.replace("start_speed =", "throttle = [0.2, 0.8]\nstart_speed ="))
+    text = text.replace("start_speed =", "throttle = [0.2, 0.8]\nstart_speed =")
+    file.write_text(f'{text}\n[[family]]\nname = "straight"\nfunction = "straight"\n')
     return file
 
 
@@ -207,6 +209,9 @@ def test_a_package_goes_through_a_whole_study(site: Path, tmp_path: Path, enter:
     one, other = (Predictor.load(tmp_path / name / cell) for name in ("local", "cluster"))
     assert np.array_equal(one.corrector.shift, other.corrector.shift)  # type: ignore[attr-defined]
     assert one.vessel is not None
+    results = read_results(tmp_path / "local")
+    ahead = np.arange(1, 6)[:, None] * results.test.columns["u"]
+    np.testing.assert_allclose(results.physics["straight"][..., 0], ahead, atol=1e-9)
     assert one.vessel.units["thruster.main.F_max"] == "N"
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import casadi as ca
+import numpy as np
 import pandas as pd
 from casadi import SX
 
@@ -55,6 +56,16 @@ class MeanError(Method):
     def fit(self, task: Task) -> dict[str, FitResult]:
         shifts = {name: missed.mean(axis=1, keepdims=True) for name, missed in task.targets.items()}
         return {name: FitResult(Shift(one, {}), [trial_row(0, {}, 0.0, 0.0)], 0.0) for name, one in shifts.items()}
+
+
+def straight(states: Any, orders: Any, weather: Any, step: float, *, hold: float = 1.0) -> Any:  # noqa: ARG001
+    """States (S, K, 6) of a ship that goes on at `hold` times its velocity u, v, and keeps its heading."""
+    ahead, psi = step * np.arange(1, next(iter(orders.values())).shape[1] + 1), states[:, 2]
+    u, v = hold * states[:, 3], hold * states[:, 4]
+    over_ground = np.cos(psi) * u - np.sin(psi) * v, np.sin(psi) * u + np.cos(psi) * v
+    paths = np.repeat(states[:, None], len(ahead), axis=1)
+    paths[..., :2] += np.stack(over_ground, axis=-1)[:, None] * ahead[:, None]
+    return paths
 
 
 def read_toy(file: Any, *_: Any) -> pd.DataFrame:
