@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import casadi as ca
@@ -19,9 +23,9 @@ from shipid.study.check import check_folder
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_study
 from shipid.study.windows import windows
-from tests.cli.running import ended
+from tests.cli.running import ended, output_of
 from tests.foundations.ships import simulated_table, study_file
-from tests.study.tiny import run_here, without_figures
+from tests.study.tiny import TINY, run_here, without_figures, without_workers
 
 FAMILIES = """
 [[family]]
@@ -175,3 +179,28 @@ def test_a_study_has_the_digits_of_a_task_by_hand(tmp_path: Path) -> None:
         assert row["H"] == pytest.approx(error.mean(), rel=1e-9)
         assert row["A"] == pytest.approx(shipid.position_error(after, prepared.test.future).mean(), rel=1e-9)
         assert row["H"] < row["A"] / 2
+
+
+@pytest.mark.slow
+def test_the_page_of_simulators_runs_as_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "own-simulator.md").read_text(encoding="utf-8")
+    for name, code in re.findall(r"^```python\n# (\w+\.py)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        (tmp_path / name).write_text(code)
+    (families,) = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    study = TINY.read_text().split("[[family]]")[0]
+    (tmp_path / "mine.toml").write_text(study + families)
+    (tmp_path / "table.toml").write_text(f'{study}[[family]]\nname = "mine"\npredictions = "paths.parquet"\n')
+    commands = [shlex.split(line) for line in re.findall(r"^\$ (.*)$", page, re.MULTILINE)]
+    assert [command[0] for command in commands] == ["shipid", "shipid", "python", "shipid"]
+    monkeypatch.chdir(tmp_path)
+    with without_figures(), without_workers():
+        for program, *arguments in commands:
+            if program == "shipid":
+                output_of(*arguments)
+            else:
+                subprocess.run([sys.executable, *arguments], check=True)
+    function, table = (shipid.read_results(tmp_path / name).cells for name in ("mine", "table"))
+    of_page = [cells[cells["foundation"].eq("mine")].reset_index() for cells in (function, table)]
+    np.testing.assert_allclose(*(cells["H"] for cells in of_page), rtol=1e-9)
+    assert sorted(function["foundation"].unique()) == ["mine", "none", "rough-1", "rough-2", "rough-3"]
+    assert (of_page[0]["H"] < of_page[0]["A"]).all()
