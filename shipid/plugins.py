@@ -54,7 +54,7 @@ class Registry(dict[str, Member]):
     def __missing__(self, name: str) -> Member:
         """Load what a package offers by this name; KeyError where none does, ShipidError where it cannot be used."""
         entry, *others = self.offers[name]
-        fault = f"{package_of(others[0])} has the name, too: uninstall one" if others else ""
+        fault = f"the package {others[0].dist.name} has the name, too: uninstall one" if others else ""
         try:
             member: Any = fault or entry.load()
             fault = fault or self.fault(member)
@@ -116,13 +116,8 @@ def log_warning(words: str) -> None:
     logging.getLogger(__name__).warning("%s", words)
 
 
-def package_of(entry: Any) -> str:
-    """Name and version of the package of an entry point."""
-    return f"{entry.dist.name} {entry.dist.version}"
-
-
 def _fault_words(entry: Any, fault: str) -> str:
-    where = f"{entry.value} of the package {package_of(entry)}"
+    where = f"{entry.value} of the package {entry.dist.name} {entry.dist.version}"
     return f"{entry.name!r} in {entry.group}, {where}, is left out: {fault}"
 
 
