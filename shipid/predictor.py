@@ -39,6 +39,7 @@ from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.hybrid.simulated import physics_entry, physics_of_entry
 from shipid.hybrid.stored import StoredData
 from shipid.metrics import vector_lengths
+from shipid.notebooks import NotebookView
 from shipid.observer import AGE_COLUMN, Observer
 from shipid.physics.signals import SIGNALS, measurable_signals
 from shipid.simulation.log import state_column
@@ -67,8 +68,10 @@ class BandedPrediction(NamedTuple):
     outside: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Predictor(DeployedMethod):
+@dataclass(frozen=True, eq=False, repr=False)
+class Predictor(
+    NotebookView, DeployedMethod, shown=("method", "vessel", "physics.horizon", "physics.step", "commands")
+):
     """Physics and a fitted method as one deployable thing: it predicts a trajectory from one instant."""
 
     @overload

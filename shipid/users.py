@@ -87,9 +87,13 @@ def locate_errors(where: str, kind: Callable[..., Any], what: str = "method") ->
 
 def error_location(error: BaseException, kind: Callable[..., Any]) -> str:
     """Where in the file of a user's class or function an error arose, ` in FILE, line N`; empty if it did not there."""
-    file = _file_and_line(kind)[0]
+    return line_in_file(error, definition_file(kind)) if is_user_code(kind) else ""
+
+
+def line_in_file(error: BaseException, file: str) -> str:
+    """Where in a file an error arose, ` in FILE, line N`; empty if it did not there."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == file]
-    return f" in {file}, line {lines[-1]}" if lines and is_user_code(kind) else ""
+    return f" in {file}, line {lines[-1]}" if lines else ""
 
 
 def definition_location(function: Callable[..., Any]) -> str:

@@ -95,7 +95,7 @@ def add(file: Path, block: str) -> None:
         end = text.index("\n}", begin.end()) + 1
         text = text[:end] + inside + text[end:]
     if definitions:
-        first = re.search(r"^[A-Z]+: dict\[[^\n]*= \{$", text, re.MULTILINE)
+        first = re.search(r"^[A-Z]+(?:: dict\[[^\n]*| \|)= \{$", text, re.MULTILINE)
         place = first.start() if first else len(text)
         text = text[:place] + "\n\n\n".join(definitions) + "\n\n\n" + text[place:]
     if imports := [line for line in imports if file.name == "__init__.py" or not line.startswith(own)]:

@@ -187,7 +187,7 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"horizon": None}, "damaged"),
         ({"limits": {"u": [1.0]}}, "damaged"),
         ({"corrector": 3}, "damaged"),
-        ({"method": "knn"}, r"the method 'knn', which is not known here: .*\(one that you wrote needs the script"),
+        ({"method": "knn"}, r"the method 'knn', which is not known here: .*\(one that you wrote needs its package"),
         ({"method": None}, "damaged"),
         ({"networks.0.basis": None}, "missing in the saved method"),
         ({"networks.0.normaliser.mean": np.zeros(3)}, "do not fit together"),

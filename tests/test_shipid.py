@@ -19,7 +19,7 @@ from shipid.document import bundled_documents_folder
 from shipid.errors import ShipidError
 from shipid.study.plan import default_folder
 from tests.documented import code
-from tests.study.tiny import TINY, without_workers
+from tests.study.tiny import TINY, command, without_workers
 
 ROOT = Path(__file__).parents[1]
 QUICK = f'"{default_folder(shipid.read_plan("quick"))}"'  # as a page of the documentation names it
@@ -102,53 +102,48 @@ def test_a_study_from_the_documentation_runs(tmp_path: Path, monkeypatch: pytest
     assert Path("gain.html").is_file()
 
 
-def script(*words: object, folder: Path) -> str:
-    """What `python my.py ...` prints to either stream."""
-    command = [sys.executable, "my.py", *map(str, words)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)])}
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, env=environment)
-    assert done.returncode == 0, done.stderr
-    return done.stdout + done.stderr
-
-
 @pytest.mark.slow
-def test_a_method_in_a_users_script_is_known_to_every_command(tmp_path: Path) -> None:
-    """The class of the notebook and the script of the how-to, with two workers: processes, which must know it too."""
+def test_a_method_in_a_file_that_is_tried_is_known_to_every_command(tmp_path: Path) -> None:
+    """The class of the notebook, with two workers: processes, which must know it too; in this process to the digit."""
     notebook = json.loads((ROOT / "docs" / "notebooks" / "own-method.ipynb").read_text(encoding="utf-8"))
     cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
-    (tmp_path / "my_method.py").write_text(cells[0])
-    (tmp_path / "my.py").write_text(blocks("howto.md")[0])
+    listed = "".join(cells[1].partition("MeanError\n")[:2])
+    (tmp_path / "my_method.py").write_text(f"{cells[0]}\n\n{listed}")
     mine = 'method=[{name = "mine", kind = "mean-error"}, {name = "alone", kind = "alone"}]'
-    for name in ("one", "two"):
-        script("study", "run", TINY, "--set", mine, "--workers", 2, "--out", name, folder=tmp_path)
-    assert "mine" in script("study", "compare", "one", "two", folder=tmp_path)
+    for name, workers in {"one": 2, "two": 0}.items():
+        more = ("--set", mine, "--workers", workers, "--out", name, "--with", "my_method.py")
+        command("study", "run", TINY, *more, folder=tmp_path)
+    tried = ("--with", "my_method.py")
+    compared = json.loads(command(*tried, "study", "compare", "one", "two", "--json", folder=tmp_path))
+    assert {row["verdict"] for row in compared["errors"]} == {"identical"}
     page = (tmp_path / "two" / "report.html").read_text(encoding="utf-8")
-    assert f'aria-label="Command">python my.py study run {TINY} --set' in page
-    with pytest.raises(ShipidError, match="'mean-error' is no kind of method"):
+    assert f'aria-label="Command">shipid --with {tmp_path}/my_method.py study run {TINY} --set' in page
+    with pytest.raises(
+        ShipidError, match=r"'mean-error' is no kind of method.*`shipid --with .*my_method\.py study rep"
+    ):
         shipid.read_cells(tmp_path / "one")
 
 
 @pytest.mark.slow
-def test_a_term_in_a_users_script_is_known_to_every_command(tmp_path: Path) -> None:
-    """The files of the page, with two workers; after an edit a resumed study says so, by the script's name."""
+def test_a_term_in_a_file_that_is_tried_is_known_to_every_command(tmp_path: Path) -> None:
+    """The file of the page, with two workers; after an edit a resumed study says so."""
     (tmp_path / "skeg.py").write_text(code("A term")[1])
-    (tmp_path / "my.py").write_text(code("A term")[2])
     (tmp_path / "ship.toml").write_text(
         'extends = "gunnerus-28.9"\n[hull.skeg]\nx = -10.0\nA = 6.0\nC = 1.8\nsource = "-"\n'
     )
     (tmp_path / "study.toml").write_text(TINY.read_text().replace('"gunnerus-28.9"', '"ship.toml"'))
-    script("study", "run", "study.toml", "--workers", 2, "--out", "one", folder=tmp_path)
-    assert 'aria-label="Command">python my.py study run ' in (tmp_path / "one" / "report.html").read_text()
-    assert "otherwise" not in script("study", "resume", "one", folder=tmp_path)
+    tried = ("--with", "skeg.py", "study")
+    command(*tried, "run", "study.toml", "--workers", 2, "--out", "one", folder=tmp_path)
+    assert "otherwise" not in command(*tried, "resume", "one", folder=tmp_path)
     (tmp_path / "skeg.py").write_text(code("A term")[1].replace("-rho / 2", "-rho * 5"))
-    assert "computed otherwise: code of the term.hull.skeg was" in script("study", "resume", "one", folder=tmp_path)
+    assert "computed otherwise: code of the term.hull.skeg was" in command(*tried, "resume", "one", folder=tmp_path)
 
 
 def test_results_of_the_how_to_become_a_table_and_a_figure(
     tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    exec(blocks("howto.md")[1].replace(QUICK, repr(str(tiny_run))), {})
+    exec(blocks("howto.md")[0].replace(QUICK, repr(str(tiny_run))), {})
     assert Path("gain.html").is_file()
 
 

@@ -39,7 +39,9 @@ def store(file: Path) -> None:
         notebook = executed(file, Path(folder))
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
-        for output in cell.get("outputs", ()):
+        for output in cell.get("outputs", [])[:]:
+            if output.get("name") == "stderr":  # bars of progress
+                cell.outputs.remove(output)
             data = output.get("data", {})
             if PLOTLY in data:
                 figure = plotly.io.from_json(json.dumps(data[PLOTLY]), skip_invalid=True)

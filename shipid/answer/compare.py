@@ -27,6 +27,7 @@ from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
 from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
 from shipid.files import quote_argument
 from shipid.metrics import error_of_windows, position_error, summarise_errors
+from shipid.notebooks import NotebookView
 from shipid.report.wording import counted_text
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
@@ -47,8 +48,8 @@ POSSIBLE = {
 """What a key number of a finding can be, by a word in its name; others can be any."""
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(NotebookView, shown=("names", "notes", "errors")):
     """Several runs beside the first of them.
 
     names : of the folders. documents : a row per value that differs: path, and a column of text per name.

@@ -10,6 +10,7 @@ from typing import Any
 from shipid.answer.pages import write_pages
 from shipid.arguments import as_path
 from shipid.errors import ShipidError
+from shipid.notebooks import progress_bar
 from shipid.study.plan import default_folder, read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.run import Event, run_study
@@ -47,11 +48,15 @@ def run(
     """
     if read_plan(study, set, trust=trust).parts:
         raise ShipidError("has several parts: run it by `shipid.events`, read each folder in parts/", path=str(study))
-    for event in events(study, set, out, workers, scheduler=scheduler, device=device, trust=trust):
-        if line := event_line(event):
-            log.info("%s", line)
-        if event.kind == "end":
-            folder = Path(event.text)
+    with progress_bar() as bar:
+        for event in events(study, set, out, workers, scheduler=scheduler, device=device, trust=trust):
+            if line := event_line(event):
+                log.info("%s", line)
+            bar.set_postfix_str(event.row.get("cell", event.text))
+            bar.total = event.total or bar.total
+            bar.update(event.done - bar.n)
+            if event.kind == "end":
+                folder = Path(event.text)
     write_pages(folder)
     return read_results(folder)
 

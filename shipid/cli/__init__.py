@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -14,6 +15,7 @@ from shipid.cli import data, family, identify, predict, simulation, study, vesse
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError, is_utf_8
+from shipid.plugins import import_files
 
 OPTIONS: dict[str, Any] = {
     "no_args_is_help": True,
@@ -46,6 +48,7 @@ def main() -> None:
         for argument in sys.argv[1:]:  # documents, pages and tables could not name such a file
             if not is_utf_8(argument):
                 raise ShipidError("is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8", path=argument)
+        sys.argv[1:] = _move_to_front(sys.argv[1:])
         app()
     except BrokenPipeError:
         sys.exit(141)
@@ -62,6 +65,13 @@ def main() -> None:
             raise
         sys.stderr.write(f"error: {line}\n")
         sys.exit(1)
+
+
+def _move_to_front(words: list[str]) -> list[str]:
+    """Move every `--with FILE` before the command: it may stand behind it."""
+    places = [place for place, word in enumerate(words) if word == "--with"]
+    moved = [place for first in places for place in (first, first + 1) if place < len(words)]
+    return [*(words[place] for place in moved), *(word for place, word in enumerate(words) if place not in moved)]
 
 
 def print_usage_error(error: Any, _: Any = None) -> None:
@@ -94,8 +104,15 @@ def error_line(error: Exception) -> str | None:
 def _configure_output(
     version: Annotated[bool, typer.Option("--version", help="show the version")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="log what is done to standard error")] = False,
+    tried: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--with", help="file of Python with terms, methods or readers of yours: it is run, here and in workers"
+        ),
+    ] = None,
 ) -> None:
     log_to_stderr(verbose)
+    import_files(tried or [])
     if version:
         typer.echo(shipid.__version__)
         raise typer.Exit

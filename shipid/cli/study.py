@@ -156,7 +156,7 @@ def study_run(
     """Run a study and write its report; an interrupted run resumes when started again."""
     from shipid.study.workers import import_for_workers
 
-    if scheduler is None:
+    if scheduler is None and workers != 0:
         import_for_workers()  # before this process imports for itself
     from shipid.study.plan import default_folder
 

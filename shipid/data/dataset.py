@@ -22,6 +22,7 @@ from shipid.arguments import as_names, as_path, check_class
 from shipid.document import requirement_words
 from shipid.errors import DataError, suggest_name
 from shipid.files import open_file, read_arrow, replace_whole
+from shipid.notebooks import NotebookView
 from shipid.physics.signals import SIGNALS, is_command, is_output, is_wrapped_angle, rows_of_role, signal_of
 
 Array = NDArray[np.float64]
@@ -40,8 +41,8 @@ SHORTEST_STEP_GROWTH = 1.1  # times: by so much the shortest interval of late gr
 _METADATA_KEY = b"shipid"
 
 
-@dataclass(frozen=True, eq=False)
-class Dataset:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dataset(NotebookView, shown=("runs", "commands", "frame")):
     """Runs of one vessel: a table that has passed `check_schema`, and where it came from. `==` compares by identity.
 
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command

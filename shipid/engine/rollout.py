@@ -18,6 +18,7 @@ from shipid.engine.engines import REPEATED, Engine, choose_engine, engine_by_nam
 from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob
 from shipid.errors import DataError, ShipidError, suggest_name
 from shipid.metrics import position_error, tally_errors
+from shipid.notebooks import NotebookView
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import ACTUAL, is_command, signal_row
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
@@ -29,8 +30,8 @@ SPEED_LIMIT = 100.0  # m/s: beyond any ship; a faster sample has diverged
 PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectories:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectories(NotebookView, shown=("names", "states", "interval")):
     """Result of a rollout.
 
     u, v and r are along the axes of the ship; those of a log are horizontal, see `horizontal_velocities`.

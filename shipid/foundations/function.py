@@ -8,7 +8,7 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, Self, cast
@@ -21,11 +21,12 @@ from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
 from shipid.physics.signals import measurable_signals
+from shipid.plugins import Registry, fault_of_kind
 from shipid.users import locate_errors, users_code
 
 SimulateFunction = Callable[..., Any]
-FUNCTIONS: dict[str, SimulateFunction] = {}
-"""Name, as after `function = ` in a document -> function, put here from Python: it needs no trust."""
+FUNCTIONS: Registry[SimulateFunction] = Registry("shipid.foundations", partial(fault_of_kind, Callable))
+"""Name, as after `function = ` in a document -> function, of Python or an installed package: it needs no trust."""
 STATES = ("north", "east", "psi", "u", "v", "r")
 ARGUMENTS = ("states", "orders", "weather", "step")
 BATCH = 1000  # instants of a call: 300 steps of 20 columns are 48 MB
@@ -84,7 +85,7 @@ class SimulatorFunction(NamedSimulator):
             return self.given
         if ":" not in self.key:
             words = f"{self.key!r}: write 'module:function', or a name that Python put into FUNCTIONS"
-            raise DocumentError(f"{words}: {suggest_name(self.key, FUNCTIONS)}")
+            raise DocumentError(f"{words}: {suggest_name(self.key, FUNCTIONS.names)}")
         if not self.trust:
             words = f"{self.key} is code that this document names: read it"
             raise DocumentError(f"{words}, and add --trust to run it (in Python: `read_plan(..., trust=True)`)")

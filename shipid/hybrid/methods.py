@@ -21,8 +21,10 @@ from shipid.hybrid.path_refined import PathRefined
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
 from shipid.hybrid.regression import Regression
+from shipid.plugins import Registry
 
-METHODS: dict[str, type[Method]] = {
+METHODS: Registry[type[Method]] = Registry("shipid.methods", fault_of_method)
+METHODS |= {
     "alone": Alone,
     "calibrator": Calibrator,
     "forest": Forest,
@@ -43,23 +45,20 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
         raise DocumentError(f"{kind!r} is no kind of method: {method_names(kind)}", path=f"{path}.kind")
-    if fault := fault_of_method(METHODS[kind]):
-        raise DocumentError(f"METHODS[{kind!r}]: {fault}", path=f"{path}.kind")
     method: Method = parse_model(METHODS[kind], dict(settings), None, path)
     return method
 
 
 def method_names(kind: str) -> str:
     """Return the names of the methods that there are, as the remedy where `kind` is none of them."""
-    return f"{suggest_name(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
+    remedy = "one that you wrote needs its package, or `--with` the file that puts it into METHODS"
+    return f"{suggest_name(kind, METHODS.names)} ({remedy})"
 
 
 def method_kind(method: Method) -> str:
     """Return the name under which the class of a method is listed; DataError where it has none, or lacks a part."""
-    kind = next((name for name, kind in METHODS.items() if type(method) is kind), None)
+    kind = METHODS.name_of(type(method))
     if kind is None:
         name = type(method).__name__
         raise DataError(f"the method {name} has no name yet: write shipid.hybrid.methods.METHODS['mine'] = {name}")
-    if fault := fault_of_method(type(method)):
-        raise DataError(f"METHODS[{kind!r}]: {fault}")
     return kind

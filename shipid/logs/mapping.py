@@ -462,7 +462,9 @@ def _parse_formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
 def _parse_format(raw: Any, file: Path, path: str) -> Format:
     kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
     if kind not in READERS:
-        raise DocumentError(f"unknown kind {kind!r}: {suggest_name(kind, READERS)}", file=file, path=f"{path}.kind")
+        raise DocumentError(
+            f"unknown kind {kind!r}: {suggest_name(kind, READERS.names)}", file=file, path=f"{path}.kind"
+        )
     form: Format = document.parse_model(READERS[kind].options, raw, file, prefix=path)
     return form
 

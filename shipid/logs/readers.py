@@ -14,6 +14,7 @@ import stat
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,8 @@ from shipid.logs.rosbag import is_bag, read_bag
 from shipid.logs.topics import TopicReader, reads_topics, topic_rows
 from shipid.logs.ulog import is_ulog, read_ulog
 from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_with_values
+from shipid.plugins import Registry, fault_of_kind
+from shipid.users import locate_errors
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
 LARGE = 4_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
@@ -82,7 +85,9 @@ def read_log_table(
         if isinstance(form, TextFormat) and size > LARGE and columns:
             table = _large_text(file, form, {clock, *columns}, progress, size)
         if table is None:
-            table = READERS[form.kind].read(file, form, (clock, *columns), progress)
+            reader = READERS[form.kind]
+            with locate_errors(f"the reader {form.kind!r}", reader.read, "reader"):
+                table = reader.read(file, form, (clock, *columns), progress)
     except OSError as error:
         if error.errno is None:  # of a library, not of the system
             raise DataError(
@@ -423,7 +428,8 @@ def _is_parquet(_: Path, head: bytes) -> dict[str, Any] | None:
     return {"kind": "parquet"} if head.startswith(b"PAR1") else None
 
 
-READERS: dict[str, LogReader] = {
+READERS: Registry[LogReader] = Registry("shipid.readers", partial(fault_of_kind, LogReader))
+READERS |= {
     "text": LogReader(TextFormat, _read_text),  # no signature: a guess takes every other file for text
     "sheet": LogReader(SheetFormat, _read_sheet, _is_sheet),
     "parquet": LogReader(ParquetFormat, _read_parquet, _is_parquet),
@@ -444,7 +450,8 @@ def list_topics(file: Path) -> list[dict[str, Any]]:
     require_file(file)
     with file.open("rb") as stream:
         head = stream.read(ENOUGH)
-    read = next((one.topics for one in READERS.values() if one.topics and one.detect and one.detect(file, head)), None)
+    every = READERS.load_all().values()
+    read = next((one.topics for one in every if one.topics and one.detect and one.detect(file, head)), None)
     if read is None:
         kinds = ", ".join(name for name, one in READERS.items() if one.topics)
         raise DataError(f"has no topics: recordings of these kinds have them: {kinds}", file=file)

@@ -7,11 +7,14 @@ it here. To add a signal: add one row to `signals.SIGNALS`.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from shipid.physics import hull, learned, propeller, radiation, restoring, rudder, thruster, waves, wind
+from shipid.physics.signals import SIGNALS
+from shipid.plugins import Registry, fault_of_kind
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,18 @@ MOTION = ("eta", "nu", "nu_r", "psi", "state")
 GIVEN = ("wash",)
 """Positional arguments that another component provides: the one named by the key `behind` of the block."""
 
-TERMS: dict[str, Term] = {
+
+def fault_of_term(term: Any) -> str:
+    """What an object lacks to be a term, one sentence; the signals that a term takes are loaded."""
+    fault = fault_of_kind(Term, term)
+    for function in () if fault else filter(callable, term.functions):
+        for name in inspect.signature(function).parameters:
+            SIGNALS.get(name)
+    return fault
+
+
+TERMS: Registry[Term] = Registry("shipid.terms", fault_of_term)
+TERMS |= {
     "hull.derivatives": Term(hull.derivatives_wrench),
     "hull.prime_derivatives": Term(hull.prime_derivatives),
     "hull.bis_derivatives": Term(hull.bis_derivatives),

@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from typing import Literal
 
+from shipid.plugins import Registry, fault_of_kind
 from shipid.units import DEGREE, RPM
 
 Role = Literal["motion", "command", "output", "environment", "derived"]
@@ -67,7 +69,8 @@ class Signal:
         return self.shown or self.unit
 
 
-SIGNALS: dict[str, Signal] = {
+SIGNALS: Registry[Signal] = Registry("shipid.signals", partial(fault_of_kind, Signal))
+SIGNALS |= {
     "north": Signal(
         "motion", "m", "north", column="required", names=r"n|north|northing|x0|x|xn|pos_?n|x_?earth|y_north"
     ),

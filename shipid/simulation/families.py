@@ -23,6 +23,7 @@ from shipid.arguments import check_choice, check_mapping, check_whole_number, wh
 from shipid.engine.rollout import SPEED_LIMIT, Trajectories, rollout
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.files import make_folder, write_set
+from shipid.notebooks import NotebookView
 from shipid.simulation.approach import Controls
 from shipid.simulation.perform import rollout_inputs
 from shipid.simulation.standard import define_standard
@@ -37,8 +38,8 @@ UNLOCKED_KEYS = {"base", "extends", "description"}
 """Keys of a family that its lock leaves out: the base is locked by its digest, what is extended is written out."""
 
 
-@dataclass(frozen=True, eq=False)
-class VesselFamily:
+@dataclass(frozen=True, eq=False, repr=False)
+class VesselFamily(NotebookView, shown=("rules.name", "base.name", "rules.members", "table")):
     """A family on its vessel.
 
     rules : the family, with `extends` written out. base : the vessel that the members change, with their `structure`.

@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
@@ -18,6 +19,7 @@ from typing import Any, TypeVar
 from shipid.errors import ShipidError
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Row, Space
+from shipid.plugins import TRIED, import_files
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -147,6 +149,7 @@ def _results(
     mistake: Exception | None = None
     lonely = False
     try:
+        client.register_worker_callbacks(partial(import_files, list(TRIED)))
         given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         for key, task in tasks:
             topic = f"{name}-{key}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import shlex
-import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -26,6 +25,7 @@ from shipid.foundations.function import SimulatorFunction
 from shipid.hybrid.simulated import Simulator
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
+from shipid.plugins import TRIED
 from shipid.simulation.families import expand_families
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
@@ -53,12 +53,6 @@ METHOD_CODE, TERM_CODE, FUNCTION_CODE = (
     "code of the term",
     "code of the function",
 )  # entries of a session: name -> digest
-USER_SCRIPT = "my.py"  # a user's script with a method or a term, where its name is unknown
-
-
-def _script() -> str:
-    """The user's script that is the command line of this process; empty for another command line, or none."""
-    return sys.argv[0] if sys.argv[0].endswith(".py") and sys.argv[1:2] == ["study"] else ""
 
 
 @dataclass(frozen=True)
@@ -218,8 +212,8 @@ def default_folder(plan: Plan) -> Path:
 
 
 def program_of(plan: Plan) -> str:
-    """The command line that knows methods and terms: `shipid`, or the user's script where the user wrote one."""
-    return "shipid" if own_code(plan).keys() <= {FUNCTION_CODE} else shlex.join(["python", _script() or USER_SCRIPT])
+    """The command line that knows methods and terms: `shipid`, with the files that the user tries."""
+    return " ".join(["shipid", *(f"--with {quote_argument(file)}" for file in TRIED if own_code(plan))])
 
 
 def own_code(plan: Plan) -> dict[str, dict[str, str]]:

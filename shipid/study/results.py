@@ -20,6 +20,7 @@ from shipid.errors import DataError, ResultError
 from shipid.files import read_arrays, read_json
 from shipid.hybrid.bands import Bands
 from shipid.metrics import error_by_axis, error_of_windows, position_error, summarise_errors
+from shipid.notebooks import NotebookView
 from shipid.predictor import check_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
@@ -41,7 +42,7 @@ class StoredPaths(UserDict[str, Any]):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Results:
+class Results(NotebookView, shown=("plan.name", "folder", "missing", "table")):
     """A run's folder, read: the plan, one row per cell, models, test windows, and the predictions of every cell.
 
     naive : errors (T, S) [m] of constant u, v, r. physics : model -> path (T, S, 2) [m] of the physics alone.
@@ -64,9 +65,9 @@ class Results:
     no_band: Mapping[str, str] = field(default_factory=dict)
     regression: Mapping[str, np.ndarray] = field(default_factory=dict)
 
-    def __repr__(self) -> str:
-        done = f"{len(self.cells)} of {self.plan.cells} cells"
-        return f"<Results of {self.plan.name!r} in {self.folder}: {done}, {len(self.test)} test windows>"
+    def table(self) -> pd.DataFrame:
+        """H [m] of each model, the mean over methods and seeds, at each N_D."""
+        return self.cells.pivot_table(index="model", columns="N_D", values="H")
 
     @property
     def rows(self) -> list[dict[str, Any]]:

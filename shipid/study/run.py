@@ -31,6 +31,7 @@ from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
+from shipid.plugins import REGISTRIES, add_members, added_members
 from shipid.study import seals, store
 from shipid.study.cells import (
     NO_ACCURACY,
@@ -44,7 +45,7 @@ from shipid.study.cells import (
 from shipid.study.cluster import Line, SentJournal, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
-from shipid.study.plan import USER_SCRIPT, Plan, Unit, own_code
+from shipid.study.plan import Plan, Unit, own_code
 from shipid.study.prepare import (
     PreparedStudy,
     foundation_record,
@@ -104,7 +105,7 @@ def run_study(
 
     Numbers do not depend on the workers or on interruptions.
 
-    workers : local processes, one thread each; default: one per core.
+    workers : local processes, one thread each; default: one per core; 0: this process, for code of a cell.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
     device : PyTorch device of rollouts and training.
     shard : (i, n), i from 1: every n-th unit of the plan from the i-th on, into `shards/i-of-n` of a folder that
@@ -114,10 +115,12 @@ def run_study(
     """
     check_class("plan", plan, Plan, "as of `read_plan`")
     folder = as_path("folder", folder)
-    workers = None if workers is None else check_whole_number("workers", workers, 1)
+    workers = None if workers is None else check_whole_number("workers", workers, 0)
     check_device(device)
-    if scheduler is None:
+    if scheduler is None and workers != 0:
         import_for_workers()
+    for registry in REGISTRIES.values():
+        _ = registry.offers  # says which names of packages are taken
     means = Means(workers, scheduler, device, shard)
     yield from (_run_parts if plan.parts else _run_one)(plan, folder, means)
 
@@ -252,7 +255,9 @@ def _compute(
     make_folder(place / store.JOURNALS)
     if means.scheduler is None:
         work = partial(_on_pool, plan, prepared, journals, begun)
-        for unit, (session, results) in on_workers(work, units, means.workers or usable_cores()):
+        for unit, (session, results) in on_workers(
+            work, units, usable_cores() if means.workers is None else means.workers
+        ):
             note_sessions(place, session)
             yield unit, results
         return
@@ -262,7 +267,7 @@ def _compute(
     def write(key: str, name: str, *given: Any) -> None:
         getattr(writer(key), name)(*given)
 
-    shared = plan, prepared, means.device, own_code(plan)
+    shared = plan, prepared, means.device, own_code(plan), added_members()
     for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, write):
         note_sessions(place, *noted)
         yield unit, results
@@ -283,10 +288,11 @@ def _on_pool(
 
 
 def _on_cluster(
-    shared: tuple[Plan, PreparedStudy, str, Code], task: tuple[Unit, bytes], line: Line
+    shared: tuple[Plan, PreparedStudy, str, Code, list[bytes]], task: tuple[Unit, bytes], line: Line
 ) -> tuple[list[dict[str, Any]], list[store.Cell]]:
     """A unit on a worker of a cluster: what it was computed with, before and after, and the results."""
-    (plan, prepared, device, code), (unit, journal) = shared, task
+    (plan, prepared, device, code, members), (unit, journal) = shared, task
+    add_members(members)
     session = session_on(device, code_at_worker(plan, code))
     with TemporaryDirectory() as folder:
         sent = SentJournal(Path(folder) / f"{unit.key}.log", journal, plan.digest, line)
@@ -405,7 +411,6 @@ def code_at_worker(plan: Plan, code: Code) -> dict[str, dict[str, str]]:
     try:
         here = own_code(imported)
     except KeyError as unknown:
-        words = f"workers lack the term {unknown}: write its line TERMS[...] = ... into a script, as {USER_SCRIPT} in"
-        more = 'docs/extending.md, above its line `if __name__ == "__main__":`; start those of Dask with --preload'
-        raise ShipidError(f"{words} {more}") from None
+        remedy = "write it into a file that they can import or that `--with` names, or take workers = 0"
+        raise ShipidError(f"workers lack the term {unknown}: {remedy}") from None
     return {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}}

@@ -41,7 +41,7 @@ from shipid.foundations.predictions import PredictionTable
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.lock import sole_writer
-from shipid.study.plan import Plan, Unit, build_plan, own_code, plan_text, program_of
+from shipid.study.plan import FUNCTION_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
 from shipid.version import __version__
 from shipid.vessel.load import check_document
 
@@ -173,7 +173,8 @@ def _remove_without_results(folder: Path) -> None:
 def _write_plan(folder: Path, plan: Plan) -> None:
     """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
-    own = {"program": program, **own_code(plan)} if (program := program_of(plan)) != "shipid" else own_code(plan)
+    own: dict[str, Any] = {**own_code(plan)}
+    own |= {"program": program_of(plan)} if own.keys() - {FUNCTION_CODE} else {}
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin, "changes": dict(plan.changes), **own})
     vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
     write_json(folder / VESSELS, vessels)
@@ -213,7 +214,7 @@ def stored_plan(folder: Path, trust: bool = False) -> Plan:
         remedy = "if the run is of another version, read its report.html, and run the study again into a new folder"
         if "program" in record:
             command = f"`{record['program']} study report {quote_argument(folder)}`"
-            remedy = f"open it by your script, which knows its methods and terms: {command}"
+            remedy = f"install the package, or name `--with` the file, that has its methods and terms: {command}"
         message = f"shipid {__version__} does not take it ({error.message}): {remedy}"
         raise NotTaken(message, file=file, path=error.path) from None
     except (TypeError, KeyError, AttributeError, ValueError):

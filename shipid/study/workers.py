@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
 from shipid.interrupts import hold_interrupts
+from shipid.plugins import TRIED, add_members, added_members, import_files
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in which a forkserver has its socket
@@ -24,7 +25,7 @@ PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"
 """Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
 NO_GUARD = 64  # exit status of a worker whose script starts workers: EX_USAGE of sysexits.h
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
-_WORK: list[Any] = []  # of a worker: what it does with its tasks, as bytes until the first one
+_WORK: list[Any] = []  # of a worker: what it does with its tasks, as bytes until the first one; see `_begin`
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -50,13 +51,17 @@ def import_for_workers() -> None:
 
 
 def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int) -> Iterator[tuple[Task, Result]]:
-    """Tasks and their results from so many processes, as they finish; each process receives `work` once.
+    """Tasks and their results from so many processes, 0 for this one, as they finish; each receives `work` once.
 
     What `work` raises is raised here; ShipidError if a process dies. The processes end with the iterator and with this
     process, whatever they are doing.
     """
+    if not count:
+        yield from ((task, work(task)) for task in tasks)
+        return
     _check_guard()
-    pool = ProcessPoolExecutor(count, get_context(_method()), _begin, (pickle.dumps(work),))
+    given = (pickle.dumps(work), TRIED, added_members())
+    pool = ProcessPoolExecutor(count, get_context(_method()), _begin, given)
     workers = pool._processes  # Python 3.14 has `kill_workers`
     try:
         with hold_interrupts(), _one_thread():  # half a process would complain
@@ -93,11 +98,14 @@ def _method() -> str:
     return METHOD if len(os.fsencode(tempfile.gettempdir())) <= LONGEST else "spawn"
 
 
-def _begin(work: bytes) -> None:
-    """Begin a worker: it leaves Ctrl-C to its parent, and ends with that, whatever it is doing."""
+def _begin(*given: Any) -> None:
+    """Begin a worker: it leaves Ctrl-C to its parent, and ends with that, whatever it is doing.
+
+    given : its work as bytes, files that it runs before, and what it takes into the registries.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    _WORK.append(work)
+    _WORK.extend(given)
 
 
 def _end_with_parent() -> None:
@@ -110,10 +118,12 @@ def _answer(task: Any) -> bytes:
     """What the work makes of a task; ShipidError where a user's own method makes what cannot be sent."""
     if isinstance(_WORK[0], bytes):
         try:
+            import_files(_WORK[1])
+            add_members(_WORK[2])
             _WORK[0] = pickle.loads(_WORK[0])
         except Exception as error:  # of a module as it is imported, or of a class that is not there
             words = f"workers import your files anew, and there it does not go ({type(error).__name__}: {error})"
-            raise ShipidError(f"{words}: write methods and terms into a file that can be imported") from None
+            raise ShipidError(f"{words}: write methods and terms into a file, or take workers = 0") from None
     try:
         result = _WORK[0](task)
     except Exception as error:

@@ -141,7 +141,7 @@ def _assemble_dynamics(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     for _, key, _ in terms:  # a notebook may have put another into TERMS since the vessel was read
         check_term(key)
     if any(is_user_code(function) for held in equation_functions(vessel.document).values() for function in held):
-        documents.parse_model(vessel_model(), vessel.document, vessel.file)
+        documents.parse_model(vessel_model(vessel.document), vessel.document, vessel.file)
         if (bind_document(vessel.document), parameter_units(vessel.document)) != (vessel.bound, vessel.units):
             raise ShipidError("its terms take other numbers than when it was read: load it again", file=vessel.file)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)

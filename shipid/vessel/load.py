@@ -17,6 +17,7 @@ from shipid.arguments import as_path
 from shipid.document import Document
 from shipid.errors import DocumentError, suggest_name
 from shipid.files import open_file
+from shipid.notebooks import NotebookView
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import total_mass
@@ -43,8 +44,8 @@ LONGEST_CHAIN = 20  # documents that extend or patch one another
 MOST_BLOCK = 2.0  # m / (rho L_pp B T), as `LEAST_BLOCK`: far beyond any ship and its degraded models
 
 
-@dataclass(frozen=True)
-class Vessel:
+@dataclass(frozen=True, repr=False)
+class Vessel(NotebookView, shown=("name", "file", "length", "parameters")):
     """A checked vessel document.
 
     document : plain nested data, after any patch; not to be changed.
@@ -102,7 +103,7 @@ class Vessel:
     @property
     def above_zero(self) -> frozenset[str]:
         """Dotted paths of the parameters that must be above 0, such as `inertia.m`."""
-        model = vessel_model()
+        model = vessel_model(self.document)
         return frozenset(
             path
             for path in self.units
@@ -153,7 +154,7 @@ class Vessel:
         documents.check_values(odd, self.file)
         document = documents.replace_values(self.document, values, self.file)
         numbers = all(type(value) in (float, int) for value in values.values())
-        if numbers and values.keys() <= self.units.keys() and documents.is_valid_for(vessel_model(), document):
+        if numbers and values.keys() <= self.units.keys() and documents.is_valid_for(vessel_model(document), document):
             vessel = Vessel(document, self.file)  # terms, names and units are as they were
             vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
             vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
@@ -284,7 +285,7 @@ def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Ves
 
 def check_document(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
-    documents.parse_model(vessel_model(), document, file)
+    documents.parse_model(vessel_model(document), document, file)
     vessel = Vessel(document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):

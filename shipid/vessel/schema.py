@@ -56,8 +56,7 @@ def split_keys(keys: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
     for key in keys:
         group, _, kind = str(key).partition(".")
         if not isinstance(key, str) or group not in GROUPS or not re.fullmatch(NAME, kind) or kind in RESERVED:
-            function = getattr(TERMS[key], "function", None)
-            place = definition_location(function) if callable(function) else ""
+            place = definition_location(TERMS[key].function) if key in TERMS else ""
             remedy = f"write <block>.<kind>, such as TERMS['hull.drag'], with one of the blocks {join_names(GROUPS)}"
             raise ShipidError(f"TERMS[{key!r}]: no block of a vessel document and a kind in it: {remedy}{place}")
         pairs.append((group, kind))
@@ -66,13 +65,13 @@ def split_keys(keys: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
 
 def check_term(key: str) -> Term:
     """The term of a key of TERMS; ShipidError, one line with its place, where its functions cannot be used."""
-    term: Any = TERMS[key]
-    if not isinstance(term, Term):
-        name = getattr(term, "__name__", repr(term))
-        place = definition_location(term) if callable(term) else ""
-        raise ShipidError(f"TERMS[{key!r}] is no Term: write TERMS[{key!r}] = Term({name}){place}")
+    term = TERMS[key]
+    split_keys((key,))
     _check_functions(key, term)
     return term
+
+
+TERMS.check = check_term  # of packages: physics knows no documents
 
 
 @cache
@@ -361,8 +360,15 @@ def _keys_of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
 
-def vessel_model() -> type[BaseModel]:
-    """Pydantic model of a whole vessel document; its JSON schema serves editors."""
+def vessel_model(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
+    """Pydantic model of a whole vessel document, with the terms of installed packages that it names.
+
+    Without a document it has those of all packages: its JSON schema serves editors.
+    """
+    if document is None:
+        TERMS.load_all()
+    for _, key, _ in () if document is None else (*term_blocks(document), *term_blocks(document, off=True)):
+        TERMS.get(key)
     return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(rows_of_role("command")))
 
 

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.method import Case, FitResult, Method
 from shipid.hybrid.methods import METHODS, method_kind, method_of
@@ -170,7 +170,6 @@ class Unfinished(Method):
 
 @pytest.mark.parametrize("listed", [Alone(), int, "Alone", Unfinished])
 def test_what_is_listed_and_no_method_is_one_line(listed: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A line of a user's script; it ended in a traceback."""
-    monkeypatch.setitem(METHODS, "mine", listed)
-    with pytest.raises(DocumentError, match=r"^method\.kind: METHODS\['mine'\]: must be a class of Method with `fit`"):
-        method_of("mine", {})
+    """A line of a user's file; it ended in a traceback."""
+    with pytest.raises(ShipidError, match=r"^'mine' in shipid\.methods: must be a class of Method with `fit`"):
+        monkeypatch.setitem(METHODS, "mine", listed)

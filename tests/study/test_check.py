@@ -46,7 +46,7 @@ def test_a_run_that_has_just_begun(tmp_path: Path) -> None:
 
 
 def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the script of a user's method is gone, the check of files gave up, too."""
+    """Where the file of a user's method is gone, the check of files gave up, too."""
     folder, changes = tmp_path / "run", {"method": [{"name": "mine", "kind": "mine"}], "repeat": {"seed": [0, 1]}}
     with monkeypatch.context() as patch:
         patch.setitem(METHODS, "mine", type("Mine", (METHODS["path-drawn"],), {"__module__": "mine"}))
@@ -58,7 +58,7 @@ def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, m
     assert not check.faults
     (line,) = check.lines
     assert line.startswith("0 faults; how far the run is cannot be said: ")
-    assert "open it by your script, which knows its methods and terms: `python my.py study report" in line
+    assert "install the package, or name `--with` the file, that has its methods and terms: `shipid study rep" in line
     part = store.part_folder(folder, next(iter(plan.parts)))
     (part / "test.npz").write_bytes(b"whole")
     seals.write_seal(part, "common", [part / "test.npz"])

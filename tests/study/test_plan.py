@@ -218,17 +218,15 @@ def test_changes_that_reach_nothing_are_reported(tmp_path: Path, changes: dict[s
     assert caught.value.path == path
 
 
-def test_the_command_of_a_users_method_names_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_of_a_users_method_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Mine(PathDrawn):
         """Of a user: no class of shipid."""
 
+    monkeypatch.setattr("shipid.study.plan.TRIED", [Path("my files/own.py")])
     assert run_command(tiny_plan(tmp_path)).startswith("shipid study run ")
     monkeypatch.setitem(METHODS, "mine", Mine)
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine", "trials": 1, "units": 8, "terms": 4}]})
-    monkeypatch.setattr("sys.argv", ["my scripts/own.py", "study", "run", "tiny.toml"])
-    assert run_command(plan).startswith(f"python 'my scripts/own.py' study run {tmp_path}/tiny.toml --set ")
-    monkeypatch.setattr("sys.argv", ["notebook_kernel.py", "-f", "key"])
-    assert run_command(plan).startswith("python my.py study run ")
+    assert run_command(plan).startswith(f"shipid --with 'my files/own.py' study run {tmp_path}/tiny.toml --set ")
 
 
 def test_digest_follows_the_document(tmp_path: Path) -> None:

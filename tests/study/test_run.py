@@ -28,7 +28,7 @@ from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error, summarise_errors
-from shipid.physics import TERMS, Term
+from shipid.physics import TERMS
 from shipid.predictor import Predictor
 from shipid.study import run, seals, store
 from shipid.study.check import check_folder
@@ -165,8 +165,8 @@ def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType
     (folder / "skeg.py").write_text(code("A term")[1])
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.delitem(sys.modules, "skeg", raising=False)
+    monkeypatch.setitem(TERMS, "hull.skeg", TERMS["hull.mmg"])
     module = importlib.import_module("skeg")
-    monkeypatch.setitem(TERMS, "hull.skeg", Term(module.skeg))
     values = {"x": -10.0, "A": 6.0, "C": 1.8, "source": "made up"}
     (folder / "ship.toml").write_text(tomlkit.dumps({"extends": "gunnerus-28.9", "hull": {"skeg": values}}))
     return module, tiny_plan(folder, {"truth.vessel": "ship.toml", "family.0.base": "ship.toml", "grid.N_D": [4]})
@@ -444,6 +444,6 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     monkeypatch.setattr(run, "run_unit", lambda *_: [])
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
     written = {"code of the method": {"mine": "01234567"}}
-    (session, after), _ = run._on_cluster((plan, None, "cpu", written), (plan.units[0], b""), Silent())  # type: ignore[arg-type]
+    (session, after), _ = run._on_cluster((plan, None, "cpu", written, []), (plan.units[0], b""), Silent())  # type: ignore[arg-type]
     assert session["code of the method"] == {"mine": "01234567"}
     assert after == session

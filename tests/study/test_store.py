@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -94,15 +93,15 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
     assert caught.value.file == str(ship / store.VESSELS)
 
 
-def test_a_folder_with_a_term_of_a_user_names_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_with_a_term_of_a_user_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It said that the run is of another version, and to compute it again."""
-    monkeypatch.setattr(sys, "argv", ["mine.py", "study", "run"])
+    monkeypatch.setattr("shipid.study.plan.TRIED", [Path("mine.py")])
     _, plan = skeg_plan(tmp_path, monkeypatch)
     folder = tmp_path / "run"
     make_run(folder, plan)
     assert store.stored_plan(folder).digest == plan.digest
     monkeypatch.delitem(TERMS, "hull.skeg")
-    words = rf"hull\.skeg.*open it by your script, .*`python mine.py study report {re.escape(str(folder))}`$"
+    words = rf"hull\.skeg.*name `--with` the file, .*`shipid --with mine.py study report {re.escape(str(folder))}`$"
     with pytest.raises(store.NotTaken, match=words):
         store.stored_plan(folder)
     assert "study report" in check_folder(folder).lines[-1]

@@ -18,11 +18,7 @@ LISTED = """
 from shipid.hybrid.methods import METHODS
 METHODS["linear"] = Linear
 """
-TERM = f"""
-{code("A term")[1]}
-from shipid.physics import TERMS, Term
-TERMS["hull.skeg"] = Term(skeg)
-"""
+TERM = code("A term")[1]
 SHIP = 'extends = "gunnerus-28.9"\n[hull.skeg]\nx = -10.0\nA = 6.0\nC = 1.8\nsource = "-"\n'
 RUN = f"""
 import shipid
@@ -34,7 +30,7 @@ RUN_TERM = f"""
 import shipid
 if __name__ == "__main__":
     change = {{"truth.vessel": "./ship.toml", "family.0.base": "./ship.toml", "grid.N_D": [4]}}
-    shipid.run({str(TINY)!r}, set=change, out="run", workers=1)
+    print(len(shipid.run({str(TINY)!r}, set=change, out="run", workers=1).cells))
 """
 
 
@@ -57,7 +53,7 @@ def ended(folder: Path, *command: str) -> str:
     ("cells", "words"),
     [
         (METHOD + LISTED + RUN, "there it does not go (AttributeError: "),
-        (TERM + RUN_TERM, "workers lack the term 'hull.skeg': write its line TERMS[...] = ... into a script"),
+        (TERM + RUN_TERM, "workers lack the term 'hull.skeg': write it into a file that they can import"),
     ],
 )
 def test_code_that_workers_lack_is_one_line(cells: str, words: str, tmp_path: Path) -> None:
@@ -69,10 +65,17 @@ def test_code_that_workers_lack_is_one_line(cells: str, words: str, tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_a_method_in_a_file_needs_no_script(tmp_path: Path) -> None:
-    """Its line in METHODS may be in a cell: a worker imports the class. It ended with a KeyError."""
+def test_code_in_a_file_or_for_this_process_runs(tmp_path: Path) -> None:
+    """The line of a method, or of a term, may be in a cell: a worker imports the class. It ended with a KeyError."""
     (tmp_path / "mine.py").write_text(METHOD)
     assert ended(tmp_path, "-c", "from mine import Linear" + LISTED + RUN) == "4"
+    assert ended(tmp_path, "-c", METHOD + LISTED + RUN.replace("workers=1", "workers=0")) == "4"
+    (tmp_path / "ship.toml").write_text(SHIP)
+    function, listed = TERM.split("\n\n\nTERMS")
+    (tmp_path / "skeg.py").write_text(function)
+    cell = f"from skeg import skeg\nfrom shipid.physics import TERMS, Term\nTERMS{listed}{RUN_TERM}"
+    assert ended(tmp_path, "-c", cell.replace('"run"', '"term"')) == "4"
+    assert ended(tmp_path, "-c", TERM + RUN_TERM.replace('"run", workers=1', '"other", workers=0')) == "4"
 
 
 def test_a_script_from_standard_input_is_named(tmp_path: Path) -> None:

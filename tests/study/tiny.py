@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +30,15 @@ def tiny_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     file = folder / "tiny.toml"
     file.write_text(TINY.read_text())
     return read_plan(file, changes)
+
+
+def command(*words: object, folder: Path, site: Path | str = "") -> str:
+    """What `shipid` prints to either stream in a folder, with the packages of another one; it ends well."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(TINY.parents[3]), str(site)])}
+    line = [sys.executable, "-m", "shipid", *map(str, words)]
+    done = subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 def whole_unit(plan: Plan, batch: Batch) -> Unit:

@@ -158,12 +158,6 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
         "begins",
         "symbols of its own, k: make",
     ),
-    "no Term": (
-        "hull.drag",
-        DRAG.replace("Term(drag)", "drag").format("pass"),
-        "begins",
-        "no Term: write TERMS['hull.",
-    ),
     "no unit": ("hull.drag", signature("nu_r: SX, *, C"), "begins", "its parameter 'C' has no unit: write `C: Annota"),
     "no signal": (
         "hull.drag",

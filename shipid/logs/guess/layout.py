@@ -23,6 +23,8 @@ from shipid.logs.mapping import is_position
 from shipid.logs.nmea import is_nmea
 from shipid.logs.readers import READERS, grouped_number, refuse_power_cut
 from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_with_values
+from shipid.plugins import describe_error, log_warning
+from shipid.users import is_user_code
 
 ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
@@ -47,8 +49,14 @@ def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, A
 
     Raises DataError where no reader reads it, or it is no table.
     """
-    for reader in READERS.values():
-        form = reader.detect(file, head) if reader.detect else None
+    for kind, reader in READERS.load_all().items():
+        try:
+            form = reader.detect(file, head) if reader.detect else None
+        except Exception as error:
+            if not is_user_code(reader.read):
+                raise
+            log_warning(f"the reader {kind!r} is left out: {describe_error(error)}")
+            continue
         if form is not None:
             return form | ({"topics": list(names)} if reader.topics and names else {})
     other = foreign_format(head)

@@ -1,0 +1,170 @@
+"""What packages installed beside shipid, and files that a user tries, add to its registries.
+
+A package names its members in its metadata, such as `[project.entry-points."shipid.terms"]` with
+`"thruster.jet" = "shipid_jet:JET"`. Names are known without an import; a member is loaded when a document names it.
+"""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import sys
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import cache, cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from shipid.errors import ShipidError
+from shipid.users import line_in_file
+
+Member = TypeVar("Member")
+REGISTRIES: dict[str, Registry[Any]] = {}
+"""Group of entry points -> the registry that they add to."""
+TRIED: list[Path] = []
+"""Files that this process has run by `import_files`, the first one first."""
+
+
+class Registry(dict[str, Member]):
+    """Members by name: those of shipid, those put in since, and those of installed packages that were named.
+
+    Iteration is over what is loaded; `in`, `get` and `[...]` know the names of installed packages, too.
+
+    group : of the entry points. fault : what an object lacks to be a member, one sentence; empty for nothing.
+    check : raises ShipidError for the name of a member of a package that cannot be used.
+    """
+
+    def __init__(self, group: str, fault: Callable[[Any], str]) -> None:
+        super().__init__()
+        self.group, self.fault = group, fault
+        self.check: Callable[[str], object] = str
+        self.added: set[str] = set()
+        REGISTRIES[group] = self
+
+    def __setitem__(self, name: str, member: Member) -> None:
+        if fault := self.fault(member):
+            raise ShipidError(f"{name!r} in {self.group}: {fault}")
+        self.added.add(name)
+        super().__setitem__(name, member)
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or name in self.offers
+
+    def __missing__(self, name: str) -> Member:
+        """Load what a package offers by this name; KeyError where none does, ShipidError where it cannot be used."""
+        entry, *others = self.offers[name]
+        fault = f"the package {others[0].dist.name} has the name, too: uninstall one" if others else ""
+        try:
+            member: Any = fault or entry.load()
+            fault = fault or self.fault(member)
+            super().__setitem__(name, member)
+            _ = fault or self.check(name)
+        except (Exception, SystemExit) as error:  # whatever the code of a package does
+            fault = describe_error(error)
+        if fault:
+            self.pop(name, None)
+            raise ShipidError(_fault_words(entry, fault))
+        return super().__getitem__(name)
+
+    @cached_property
+    def offers(self) -> dict[str, list[Any]]:
+        """Name -> entry points of installed packages; a name that shipid has stays its own, with a warning."""
+        found: dict[str, list[Any]] = {}
+        for entry in installed_entries().select(group=self.group):
+            if super().__contains__(entry.name):
+                log_warning(_fault_words(entry, "the name is taken"))
+            else:
+                found.setdefault(entry.name, []).append(entry)
+        return found
+
+    @property
+    def names(self) -> list[str]:
+        """Every name, of what is loaded and of what is not."""
+        return list(dict.fromkeys([*self, *self.offers]))
+
+    def get(self, name: str, default: Any = None) -> Member | None:  # type: ignore[override]
+        """The member of a name, or the default."""
+        return self[name] if name in self else default  # noqa: SIM401 - `dict.get` loads nothing
+
+    def load_all(self) -> Self:
+        """The registry with all that packages offer; a warning, once, for each that cannot be used."""
+        for name in self.names:
+            try:
+                self[name]
+            except ShipidError as error:
+                log_warning(str(error))
+        return self
+
+    def name_of(self, member: Member) -> str | None:
+        """Name of a member; None for an object that is none."""
+        looks: tuple[Callable[[], dict[str, Member]], ...] = (lambda: self, self.load_all)
+        return next((name for look in looks for name, one in look().items() if one is member), None)
+
+
+@cache
+def installed_entries() -> Any:
+    """Entry points of all packages that this process can import, read once."""
+    from importlib.metadata import entry_points  # takes longer than all else here
+
+    return entry_points()
+
+
+@cache
+def log_warning(words: str) -> None:
+    """Log a warning at its first call with these words."""
+    logging.getLogger(__name__).warning("%s", words)
+
+
+def _fault_words(entry: Any, fault: str) -> str:
+    where = f"{entry.value} of the package {entry.dist.name} {entry.dist.version}"
+    return f"{entry.name!r} in {entry.group}, {where}, is left out: {fault}"
+
+
+def describe_error(error: BaseException) -> str:
+    """An error of code that is not shipid's, on one line."""
+    kind = "" if isinstance(error, ShipidError) else f"{type(error).__name__}: "
+    return kind + " ".join(str(error).split())
+
+
+def fault_of_kind(kind: Any, member: object) -> str:
+    """What an object lacks to be of a class, one sentence; empty for nothing."""
+    return "" if isinstance(member, kind) else f"must be a {kind.__name__} of {kind.__module__}, not {member!r}"
+
+
+def import_files(files: Iterable[Path]) -> None:
+    """Run files that put members into registries, each as a module of its name; workers then run them, too.
+
+    ShipidError, one line, for one that is not there, has the name of another module, or raises.
+    """
+    for file in files:
+        path = file.resolve()
+        if not path.is_file():
+            raise ShipidError("no such file: on a cluster each machine needs it", file=file, path="--with")
+        sys.path[:0] = [] if str(path.parent) in sys.path else [str(path.parent)]
+        try:
+            found = getattr(import_module(path.stem), "__file__", None)
+        except (Exception, SystemExit) as error:  # whatever the user wrote
+            words = describe_error(error) + line_in_file(error, str(path))
+            raise ShipidError(words, file=file, path="--with") from None
+        if found is None or Path(found).resolve() != path:
+            raise ShipidError(f"{path.stem!r} is the name of another module: rename it", file=file, path="--with")
+        TRIED.extend({path} - {*TRIED})
+
+
+def added_members() -> list[bytes]:
+    """What was put into registries of this process, for `add_members` of a worker; without what cannot be sent."""
+    found = []
+    for group, registry in REGISTRIES.items():
+        for name in registry.added.intersection(registry):
+            with suppress(Exception):  # a function in a function, for example
+                found.append(pickle.dumps((group, name, registry[name])))
+    return found
+
+
+def add_members(members: Iterable[bytes]) -> None:
+    """Put what another process has added into the registries of this one; without what cannot be imported here."""
+    for one in members:
+        with suppress(Exception):  # a function of a cell, for example: an error names it when it is needed
+            group, name, member = pickle.loads(one)
+            REGISTRIES[group][name] = member
