@@ -1,0 +1,1 @@
+"""Foundations that others bring: simulators that shipid runs, and does not write."""
