@@ -352,9 +352,9 @@ def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: 
         raise DocumentError(words, file=file, path=f"{path}.variable")
     variable = variables[row.variable]
     roles = [role for role, kinds in ROLES.items() if variable.causality in kinds]
-    role = row.role or next(iter(roles), None)
+    role: Any = row.role or next(iter(roles), None)
     if role not in roles or role == ("input" if signal in STATES else "output"):
-        words = f"{row.variable!r} has the causality {variable.causality}, so it cannot be the {role or 'variable'} of {signal}"
+        words = f"{row.variable!r} has the causality {variable.causality}, no {role or 'variable'} of {signal}"
         raise DocumentError(words, file=file, path=f"{path}.role")
     si = SIGNALS[signal_of(signal)].unit
     declared = variable.unit or getattr(variable.declaredType, "unit", None)

@@ -109,7 +109,7 @@ def test_what_a_ship_prints_goes_nowhere(folder, capfd):
         ('north = { variable = "y" }', "", "no row gives north; variables of the FMU for a row of role output: x, y"),
         ('variable = "rpm"', 'variable = "rpms"', "no real variable 'rpms': did you mean 'rpm'?"),
         ('unit = "rpm"', 'unit = "kn"', "'kn': give one of rev/s, rpm"),
-        ('variable = "rudder"', 'variable = "rate"', "'rate' has the causality output, so it cannot be the output of rudder.delta"),
+        ('variable = "rudder"', 'variable = "rate"', "'rate' has the causality output, no output of rudder.delta"),
         ('"rudder.delta"', '"rudder.angle"', "no signal: give north, east"),
         ("file =", "fil =", "missing"),
         ("limit = 1", "limit = -1", "must be"),
