@@ -5,7 +5,6 @@ The standard: Functional Mock-up Interface 1.0, 2.0 and 3.0 for co-simulation, f
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +21,7 @@ from shipid.checked import CheckedModel, Positive
 from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.foundations.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.logs.mapping import UNITS
-from shipid.physics.signals import SIGNALS, is_command, signal_of
+from shipid.physics.signals import ACTUAL, SIGNALS, is_command, signal_of
 from shipid.units import DEGREE
 
 Array = np.ndarray
@@ -69,6 +68,11 @@ class Link:
     factor: float
     row: FmuRow
 
+    @property
+    def over_ground(self) -> bool:
+        """Whether it is a speed along north or east, in place of u or v."""
+        return self.signal in ("u", "v") and self.row.frame in ("ned", "enu")
+
     def to_signal(self, values: Array) -> Array:
         """The signal [SI] of values of the variable."""
         return self._turned(self.factor * (self.row.scale * values + self.row.offset))
@@ -85,20 +89,31 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Along:
+    """A record of a run from its beginning, and the windows that begin in it.
+
+    record : states, orders and weather, name -> (N,) [SI], a row for each step of the FMU. windows : places of some of
+        the S windows. rows : of the record, rising, at which they begin.
+    """
+
+    record: Mapping[str, Array]
+    windows: Sequence[int]
+    rows: Sequence[int]
+
+
+@dataclass(frozen=True)
 class Fmu:
     """An FMU with its table.
 
     file : of the table, or of the FMU itself, whose variables are then signals by their names. path : of the FMU.
-    start, inputs, outputs : the rows by their use. parameters : name -> value of each real parameter that is no signal.
+    links : role -> rows, `parameter` with `start`. parameters : name -> value of each real parameter that is no signal.
     references : name of a parameter -> its value reference. branches : whether it can go back to a state that it had.
     """
 
     file: Path
     path: Path
     table: FmuTable
-    start: tuple[Link, ...]
-    inputs: tuple[Link, ...]
-    outputs: tuple[Link, ...]
+    links: Mapping[str, Sequence[Link]]
     parameters: Mapping[str, float]
     references: Mapping[str, int]
     branches: bool
@@ -106,56 +121,53 @@ class Fmu:
     @property
     def startable(self) -> bool:
         """Whether it can be started with given u and r; else it runs along a run from its beginning."""
-        return {"u", "r"} <= {link.signal for link in self.start}
-
-    @property
-    def digest(self) -> str:
-        """Digest (8 hex digits) of the FMU and its table."""
-        return hashlib.sha256(self.path.read_bytes() + self.table.model_dump_json().encode()).hexdigest()[:8]
+        return {"u", "r"} <= {link.signal for link in self.links["start"]}
 
     def simulate(
-        self, states: Array, inputs: Mapping[str, Array], step: float, parameters: Mapping[str, float]
-    ) -> tuple[Array, list[str]]:
-        """Motion (S, K, 6) after 1..K steps [s] from each state, no numbers from where it fails on, and the faults.
-
-        states : (S, 6) north, east [m], psi [rad], u, v [m/s], r [rad/s]. inputs : orders and weather, name -> (S, K)
-            [SI]. parameters : of the FMU, in its own units; others keep the values that they have there.
-        """
-        every = self._steps_within(step)
-        begun = dict(zip(STATES, np.asarray(states, float).T, strict=True)) | {k: v[:, 0] for k, v in inputs.items()}
-        start, branches = _variables(self.start, begun), self._branches(states, inputs, every)
-        runs = [FmuRun(one, [], branch) for one, branch in zip(start.tolist(), branches, strict=True)]
-        names = {link.signal for link in self.start}
-        motion, faults = self._motion(runs, step, every, parameters)
-        moved, turned = not {"north", "east"} <= names, "psi" not in names
-        return _move_motion(motion, states, moved or turned, turned)[:, 1:], faults
-
-    def simulate_along(
         self,
-        record: Mapping[str, Array],
-        rows: Sequence[int],
         states: Array,
         inputs: Mapping[str, Array],
         step: float,
         parameters: Mapping[str, float],
+        along: Sequence[Along] = (),
     ) -> tuple[Array, list[str]]:
-        """The same, for an FMU that starts at the beginning of a run: it branches off at some rows of the record.
+        """Motion (S, K + 1, 6) after 0..K steps [s], no numbers from where it fails on, and the faults.
 
-        Its motion from there on is moved and turned to the true place and heading; its speeds stay its own.
+        It begins at the states. Where the FMU cannot be started with u and r, it runs along the run from its beginning,
+        and goes on from each window; its motion is then moved and turned to the place and heading of the states, its
+        speeds are its own.
 
-        record : states, orders and weather of the run, name -> (N,), every `fmu.step`, or `step`. rows : rising, of S.
+        states : (S, 6) north, east [m], psi [rad], u, v [m/s], r [rad/s]. inputs : orders and weather, name -> (S, K)
+            [SI]. parameters : of the FMU, in its own units; others keep the values that they have there. along : the
+            runs of the windows; without them actuators begin at their orders.
         """
-        every = self._steps_within(step)
-        given = _variables(self.inputs, record).tolist()
-        start = _variables(self.start, {name: values[:1] for name, values in record.items()})[0].tolist()
-        runs: list[FmuRun] = []
-        last = 0
-        for place, branch in zip(rows, self._branches(states, inputs, every), strict=True):
-            on = self.branches and bool(runs)
-            runs.append(FmuRun(None if on else start, given[last if on else 0 : place], branch, self.branches))
-            last = place
-        motion, faults = self._motion(runs, step, every, parameters)
-        return _move_motion(motion, states, True, True)[:, 1:], faults
+        begun, every = dict(zip(STATES, np.asarray(states, float).T, strict=True)), self.steps_within(step)
+        given = self._variables("input", {"psi": begun["psi"][:, None], **inputs}).repeat(every, axis=1).tolist()
+        names = {link.signal for link in self.links["start"]}
+        reached = {name for name in names if name.startswith(ACTUAL)}
+        if self.startable:
+            begun |= {name: values[:, 0] for name, values in inputs.items()}
+            begun |= {name: begun[name.removeprefix(ACTUAL)].copy() for name in reached}
+            tracks = [FmuRun(self._start_of(one), [], self._record_of(one)) for one in along if reached]
+            for one, values in zip(along, self._signals(tracks, step / every, 1, parameters)[0], strict=False):
+                for name in reached:
+                    begun[name][one.windows] = values[name][one.rows]
+            order: Sequence[int] = range(len(given))
+            starts = self._variables("start", begun).tolist()
+            runs = [FmuRun(start, [], branch) for start, branch in zip(starts, given, strict=True)]
+        else:
+            order, runs = [place for one in along for place in one.windows], []
+            for one in along:
+                record, last = self._record_of(one), None
+                for place, row in zip(one.windows, one.rows, strict=True):
+                    start = self._start_of(one) if last is None else None
+                    runs.append(FmuRun(start, record[last or 0 : row], given[place], self.branches))
+                    last = row if self.branches else None
+        found, faults = self._signals(runs, step / every, every, parameters)
+        motion = np.full((len(given), len(given[0]) // every + 1, len(STATES)), np.nan)
+        motion[list(order)] = [np.stack([one[name] for name in STATES], axis=-1) for one in found]
+        turned = not (self.startable and "psi" in names)
+        return _move_motion(motion, states, turned or not {"north", "east"} <= names, turned), faults
 
     def describe_response(self, state: Array, inputs: Mapping[str, float], changes: Mapping[str, float]) -> list[str]:
         """A sentence on each order that changes by a step: which way the ship turns, how fast it is in the end.
@@ -163,41 +175,40 @@ class Fmu:
         state : (6,) at the start. inputs, changes : name -> value, and how much more it is from the start on [SI].
         DocumentError where heading and place do not follow from r, u and v: a wrong sign, unit or frame.
         """
-        names, step = list(changes), self.table.step or RESPONSE / 200
-        values = {
-            key: np.full(len(names), value) + [changes[key] * (key == one) for one in names]
-            for key, value in inputs.items()
-        }
-        held = {key: np.repeat(value[:, None], round(RESPONSE / step), axis=1) for key, value in values.items()}
-        motion, faults = self.simulate(np.tile(state, (len(names), 1)), held, step, {})
+        step, still = self.table.step or RESPONSE / 200, dict(zip(STATES, np.reshape(state, (6, 1)), strict=True))
+        held = [
+            {key: np.array([value + changes[key] * (key == one)]) for key, value in inputs.items()} for one in changes
+        ]
+        ahead = {key: np.stack([one[key] for one in held]).repeat(round(RESPONSE / step), axis=1) for key in inputs}
+        along = [Along(still | one, [place], [0]) for place, one in enumerate(held)]
+        motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, {}, along)
         if not np.isfinite(motion).all():
             raise DocumentError(f"the FMU fails in a step response: {'; '.join(faults[:1])}", file=self.file)
         self._check_rates(motion, step)
-        ends = [
-            (name, changes[name], one[-1, 5], np.hypot(one[-1, 3], one[-1, 4]))
-            for name, one in zip(names, motion, strict=True)
-        ]
+        sides = ["starboard" if r > 0 else "port" for r in motion[:, -1, 5]]
         return [
-            f"{name} {change:+.3g} {SIGNALS[signal_of(name)].unit}: after {RESPONSE:g} s it turns to "
-            f"{'starboard' if r > 0 else 'port'} by {abs(r) / DEGREE:.2g} deg/s at {speed:.3g} m/s"
-            for name, change, r, speed in ends
+            f"{name} {change:+.3g} {SIGNALS[signal_of(name)].unit}: after {RESPONSE:g} s it turns to {side} by "
+            f"{abs(end[5]) / DEGREE:.2g} deg/s at {np.hypot(*end[3:5]):.3g} m/s"
+            for (name, change), side, end in zip(changes.items(), sides, motion[:, -1], strict=True)
         ]
 
     def _check_rates(self, motion: Array, step: float) -> None:
         """Raise DocumentError where changes of heading and place are not the integrals of r, u and v."""
         north, east, psi, u, v, r = np.moveaxis(motion, -1, 0)
-        between = [(one[:, 1:] + one[:, :-1]) / 2 for one in (psi, u, v, r)]
-        along = np.diff(north + 1j * east) * np.exp(-1j * between[0])
-        moved = {"psi": np.diff(psi), "u": along.real, "v": along.imag}
-        for (name, change), rate in zip(moved.items(), (between[3], *between[1:3]), strict=True):
+        middle, *rates = [(one[:, 1:] + one[:, :-1]) / 2 for one in (psi, r, u, v)]
+        along = np.diff(north + 1j * east) * np.exp(-1j * middle)
+        fastest = np.hypot(*rates[1:]).max()
+        for name, change, rate in zip("ruv", (np.diff(psi), along.real, along.imag), rates, strict=True):
             size = float((rate**2).sum())
             slope = float((change * rate).sum()) / (step * size) if size else 1.0
-            if abs(slope - 1) > SLOPE and np.sqrt(size) > SLOPE * np.hypot(*between[1:3]).max() * (name == "v"):
-                what, of = ("heading changes", "r") if name == "psi" else ("place changes", name)
-                words = f"{what} by {slope:.3g} times the integral of {of}: check sign (scale), unit and frame of both"
-                raise DocumentError(words, file=self.file, path=f"fmu.{of}")
+            if abs(slope - 1) > SLOPE and (name != "v" or np.sqrt(size) > SLOPE * fastest):
+                what = "heading changes" if name == "r" else "place changes"
+                words = (
+                    f"{what} by {slope:.3g} times the integral of {name}: check sign (scale), unit and frame of both"
+                )
+                raise DocumentError(words, file=self.file, path=f"fmu.{name}")
 
-    def _steps_within(self, step: float) -> int:
+    def steps_within(self, step: float) -> int:
         """Steps of the FMU in one of the prediction."""
         every = whole_steps(step, self.table.step or step)
         if not every:
@@ -205,53 +216,60 @@ class Fmu:
             raise DocumentError(words, file=self.file, path="fmu.step")
         return every
 
-    def _branches(self, states: Array, inputs: Mapping[str, Array], every: int) -> Any:
-        """Inputs of the FMU in each of its steps, S lists of rows."""
-        psi = {"psi": np.asarray(states, float)[:, 2:3]}
-        return np.repeat(_variables(self.inputs, psi | dict(inputs)), every, axis=1).tolist()
+    def _start_of(self, along: Along) -> list[float]:
+        """Start values at the beginning of a run, where actuators are at their orders."""
+        first = {name: values[:1] for name, values in along.record.items()}
+        orders = {f"{ACTUAL}{name}": values for name, values in first.items()}
+        return list(self._variables("start", orders | first)[0].tolist())
 
-    def _motion(
+    def _record_of(self, along: Along) -> Any:
+        """Inputs of the FMU in each step of a record."""
+        return self._variables("input", along.record).tolist()
+
+    def _variables(self, role: str, signals: Mapping[str, Array]) -> Array:
+        """Values (..., n) of the variables of a role; ShipidError where a signal is not there."""
+        links = self.links[role]
+        if missing := next((link.signal for link in links if link.signal not in signals), None):
+            raise DocumentError(
+                f"the FMU takes {missing}, which the runs do not have", file=self.file, path=f"fmu.{missing}"
+            )
+        values = dict(signals)
+        if any(link.over_ground for link in links):
+            over = (signals["u"] + 1j * signals["v"]) * np.exp(1j * signals["psi"])
+            values |= {"ned u": over.real, "ned v": over.imag, "enu u": over.imag, "enu v": over.real}
+        keys = [f"{link.row.frame} {link.signal}" if link.over_ground else link.signal for link in links]
+        found = [link.to_variable(values[key]) for key, link in zip(keys, links, strict=True)]
+        return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.empty((*np.shape(signals["psi"]), 0))
+
+    def _signals(
         self, runs: Sequence[FmuRun], step: float, every: int, parameters: Mapping[str, float]
-    ) -> tuple[Array, list[str]]:
-        """Motion (S, K + 1, 6) of runs as the FMU has it, from its branch on, and the faults."""
+    ) -> tuple[list[dict[str, Array]], list[str]]:
+        """Signals of each run [SI], name -> (K + 1,) in the axes of the FMU, from its branch on, and the faults."""
         if unknown := next((name for name in parameters if name not in self.parameters), None):
             words = f"no parameter of the FMU: {suggest_name(unknown, self.parameters)}"
             raise DocumentError(words, file=self.file, path=unknown)
-        start, inputs, outputs = ([one.reference for one in links] for links in (self.start, self.inputs, self.outputs))
+        start, inputs, outputs = (
+            [link.reference for link in self.links[role]] for role in ("start", "input", "output")
+        )
         begun = [self.references[name] for name in parameters]
-        call = FmuCall(begun, list(map(float, parameters.values())), start, inputs, outputs, step / every, every)
-        records = np.full((len(runs), len(runs[0].branch) // every + 1, len(self.outputs)), np.nan)
-        faults = []
+        call = FmuCall(begun, list(map(float, parameters.values())), start, inputs, outputs, step, every)
+        found, faults = list[dict[str, Array]](), list[str]()
         with tempfile.TemporaryDirectory(prefix="shipid-fmu-") as folder:
             with zipfile.ZipFile(self.path) as archive:
                 archive.extractall(folder)
-            for place, (rows, fault) in enumerate(run_fmu(Path(folder), call, runs, self.table.limit)):
-                records[place, : len(rows)] = np.reshape(rows, (-1, len(self.outputs)))
+            for run, (rows, fault) in zip(runs, run_fmu(Path(folder), call, runs, self.table.limit), strict=True):
+                records = np.full((len(run.branch) // every + 1, len(outputs)), np.nan)
+                records[: len(rows)] = np.reshape(rows, (-1, len(outputs)))
+                values = {link.signal: link.to_signal(records[:, at]) for at, link in enumerate(self.links["output"])}
+                values["psi"] = np.unwrap(values["psi"])
+                frames = {link.row.frame for link in self.links["output"] if link.over_ground}
+                if frames:
+                    over = values["u"] + 1j * values["v"] if frames == {"ned"} else values["v"] + 1j * values["u"]
+                    ahead = over * np.exp(-1j * values["psi"])
+                    values |= {"u": ahead.real, "v": ahead.imag}
+                found.append(values)
                 faults += [fault] if fault else []
-        values = {link.signal: link.to_signal(records[..., place]) for place, link in enumerate(self.outputs)}
-        values["psi"] = np.unwrap(values["psi"])
-        frames = {link.signal: link.row.frame for link in self.outputs}
-        if frames["u"] in ("ned", "enu"):
-            over = values["u"] + 1j * values["v"] if frames["u"] == "ned" else values["v"] + 1j * values["u"]
-            ahead = over * np.exp(-1j * values["psi"])
-            values |= {"u": ahead.real, "v": ahead.imag}
-        return np.stack([values[name] for name in STATES], axis=-1), faults
-
-
-def _variables(links: Sequence[Link], signals: Mapping[str, Array]) -> Array:
-    """Values (..., n) of the variables of links; ShipidError where a signal is not there."""
-    if missing := next((link.signal for link in links if link.signal not in signals), None):
-        raise ShipidError(f"the FMU takes {missing}, which the runs do not have")
-    values = dict(signals)
-    if any(link.signal in ("u", "v") and link.row.frame in ("ned", "enu") for link in links):
-        over = (signals["u"] + 1j * signals["v"]) * np.exp(1j * signals["psi"])
-        values |= {"ned u": over.real, "ned v": over.imag, "enu u": over.imag, "enu v": over.real}
-    keys = [f"{link.row.frame} {link.signal}" for link in links]
-    found = [
-        link.to_variable(values[key if key in values else link.signal]) for key, link in zip(keys, links, strict=True)
-    ]
-    shape = np.broadcast_shapes(*(np.shape(one) for one in found)) if found else np.shape(signals["psi"])
-    return np.stack([np.broadcast_to(one, shape) for one in found], axis=-1) if found else np.empty((*shape, 0))
+        return found, faults
 
 
 def _move_motion(motion: Array, states: Array, moved: bool, turned: bool) -> Array:
@@ -291,26 +309,21 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
         for row in its:
             for role, link in _links_of_row(signal, row, variables, file):
                 links[role].append(link)
-    before = (*links["start"], *links["parameter"])
-    for role, wanted in (("output", STATES), ("input", ("orders",))):
-        have = {link.signal for link in links[role]} | ({"orders"} if links["input"] else set())
-        if missing := [name for name in wanted if name not in have]:
+    have = {link.signal for link in links["output"]}
+    missing = {"output": [name for name in STATES if name not in have], "input": [] if links["input"] else ["orders"]}
+    for role, names in missing.items():
+        if names:
             there = ", ".join(one.name for one in variables.values() if one.causality in ROLES[role]) or "none"
-            words = f"no row gives {', '.join(missing)}; variables of the FMU for a row of role {role}: {there}"
+            words = f"no row gives {', '.join(names)}; variables of the FMU for a row of role {role}: {there}"
             raise DocumentError(words, file=file, path="fmu")
     used = {link.reference for some in links.values() for link in some}
-    free = {
-        name: one
-        for name, one in variables.items()
-        if one.causality == "parameter" and one.start is not None and one.valueReference not in used
-    }
+    free = {name: one for name, one in variables.items() if one.causality == "parameter" and one.start is not None}
+    free = {name: one for name, one in free.items() if one.valueReference not in used}
     return Fmu(
         file,
         path,
         table,
-        before,
-        tuple(links["input"]),
-        tuple(link for link in links["output"] if link.signal in STATES),
+        links | {"start": links["start"] + links["parameter"]},
         {name: float(one.start) for name, one in free.items()},
         {name: one.valueReference for name, one in free.items()},
         description.fmiVersion[0] != "1" and description.coSimulation.canGetAndSetFMUstate,
@@ -338,7 +351,11 @@ def _read_description(path: Path) -> Any:
 
 def _is_signal(name: str) -> bool:
     """Whether a name is that of a state, an order or the weather."""
-    return name in STATES or is_command(name) or (name in SIGNALS and SIGNALS[name].role == "environment")
+    return (
+        name in STATES
+        or is_command(name.removeprefix(ACTUAL))
+        or (name in SIGNALS and SIGNALS[name].role == "environment")
+    )
 
 
 def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: Path) -> Iterator[tuple[str, Link]]:
@@ -353,7 +370,7 @@ def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: 
     variable = variables[row.variable]
     roles = [role for role, kinds in ROLES.items() if variable.causality in kinds]
     role: Any = row.role or next(iter(roles), None)
-    if role not in roles or role == ("input" if signal in STATES else "output"):
+    if role not in roles or role == ("input" if signal in STATES or signal.startswith(ACTUAL) else "output"):
         words = f"{row.variable!r} has the causality {variable.causality}, no {role or 'variable'} of {signal}"
         raise DocumentError(words, file=file, path=f"{path}.role")
     si = SIGNALS[signal_of(signal)].unit

@@ -17,20 +17,20 @@ from typing import Any
 
 Rows = list[list[float]]
 MOST_ENDS = 3  # how often an FMU may hang or end its process before its other runs are given up
-TO_LOAD = 60.0  # s until an FMU is loaded
-LONGEST_LOG = 1_000_000  # bytes that an FMU has printed, before they are thrown away
+TO_LOAD = 60.0  # s that loading an FMU may take
+LAST_LINE = 200  # characters of what it printed that a fault quotes
 
 
 @dataclass(frozen=True)
 class FmuCall:
     """How an FMU is called: value references of its variables, and its steps.
 
-    begun, values : what is set before it is initialised, the same in every run, and its values. start, inputs,
+    before, values : what is set before it is initialised, the same in every run, and its values. start, inputs,
         outputs : what else is set then; what is set before each step; what is read. step : of communication [s].
     every : steps between two records.
     """
 
-    begun: Sequence[int]
+    before: Sequence[int]
     values: Sequence[float]
     start: Sequence[int]
     inputs: Sequence[int]
@@ -58,49 +58,41 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
 
     folder : of the unpacked FMU. limit : [s] that a run may take.
     """
-    done, ends, fault = 0, 0, ""
-    while done < len(runs) and ends < MOST_ENDS:
-        with tempfile.TemporaryFile("ab+") as log:
-            here, there = Pipe()
-            command = [sys.executable, "-P", "-m", "shipid.foundations.fmu_process", str(there.fileno()), str(folder)]
-            environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-            process = subprocess.Popen(
-                command, pass_fds=[there.fileno()], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=log,
-                stderr=log,
-            )  # fmt: skip
+    left, ends, fault = list(runs), 0, ""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    while left and ends < MOST_ENDS:
+        (here, there), allowed = Pipe(), TO_LOAD + limit
+        command = [sys.executable, "-P", "-m", "shipid.foundations.fmu_process", str(there.fileno()), str(folder)]
+        with tempfile.TemporaryFile() as log, here:
+            given: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
+            process = subprocess.Popen(command, pass_fds=[there.fileno()], cwd=folder, **given)
             there.close()
             try:
-                here.send((call, runs[done:]))
-                allowed = TO_LOAD
-                while done < len(runs) and here.poll(allowed):
-                    rows, fault = here.recv()
-                    if rows is None:  # loaded
-                        allowed = limit
-                        continue
-                    yield rows, fault and f"{fault}{_last_line(log)}"
-                    done += 1
-                fault = f"takes longer than {allowed:g} s"
+                here.send((call, left))
+                while left and here.poll(allowed):
+                    (rows, fault), allowed = here.recv(), limit
+                    yield rows, fault + _last_line(log) * bool(fault)
+                    os.ftruncate(log.fileno(), 0)
+                    del left[0]
+                fault = f"takes longer than {limit:g} s"
             except (EOFError, OSError):
                 fault = "ends its process"
             finally:
                 process.kill()
                 process.wait()
-                here.close()
-            if done < len(runs):
-                yield [], f"{fault}{_last_line(log)}"
-                done, ends = done + 1, ends + 1
-    yield from (([], fault) for _ in runs[done:])
+            if left:
+                fault += _last_line(log)
+                yield [], fault
+                del left[0]
+                ends += 1
+    yield from (([], fault) for _ in left)
 
 
 def _last_line(log: Any) -> str:
     """The last line that the FMU printed, in brackets."""
-    size = log.seek(0, os.SEEK_END)
-    log.seek(max(size - 1000, 0))
-    lines = log.read().decode(errors="replace").split("\n")
-    if size > LONGEST_LOG:
-        log.truncate(0)
-    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return f" ({last[:200]})" if last else ""
+    end = os.fstat(log.fileno()).st_size
+    lines = os.pread(log.fileno(), LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").split("\n")
+    return next((f" ({line.strip()})" for line in reversed(lines) if line.strip()), "")
 
 
 class FmuInstance:
@@ -109,16 +101,15 @@ class FmuInstance:
     def __init__(self, folder: str, call: FmuCall):
         import fmpy
 
-        self.folder, self.call, self.used, self.time = folder, call, False, 0.0
         self.description = fmpy.read_model_description(folder, validate=False)
-        self.version = self.description.fmiVersion[0]
+        self.folder, self.call, self.version = folder, call, self.description.fmiVersion[0]
         self.renew()
 
     def renew(self) -> None:
         """Take a new instance."""
         from fmpy.simulation import instantiate_fmu
 
-        self.fmu = instantiate_fmu(self.folder, self.description, "CoSimulation")
+        self.fmu, self.used, self.time = instantiate_fmu(self.folder, self.description, "CoSimulation"), False, 0.0
         real = "Float64" if self.version == "3" else "Real"
         self.get, self.set = getattr(self.fmu, f"get{real}"), getattr(self.fmu, f"set{real}")
 
@@ -128,39 +119,38 @@ class FmuInstance:
         try:
             if self.used:
                 self.fmu.reset()
-        except Exception:  # after a fatal fault, or of an FMU that has none
+        except Exception:  # after a fatal fault, or of an FMU that has no reset
             self.renew()
-        fmu, self.used, self.time = self.fmu, True, 0.0
+        self.used, self.time = True, 0.0
         if self.version == "2":
-            fmu.setupExperiment(startTime=0.0)
-        self.set([*call.begun, *call.start, *call.inputs], [*call.values, *start, *first])
+            self.fmu.setupExperiment(startTime=0.0)
+        self.set([*call.before, *call.start, *call.inputs], [*call.values, *start, *first])
         if self.version == "1":
-            fmu.initialize()
+            self.fmu.initialize()
         else:
-            fmu.enterInitializationMode()
-            fmu.exitInitializationMode()
+            self.fmu.enterInitializationMode()
+            self.fmu.exitInitializationMode()
 
     def step(self, inputs: Sequence[float]) -> None:
         """Do a step with these inputs; RuntimeError where the FMU ends the simulation."""
         self.set(self.call.inputs, inputs)
         ended = self.fmu.doStep(self.time, self.call.step)
         if self.version == "3" and (ended[1] or ended[2]):
-            raise RuntimeError("ends the simulation")
+            raise RuntimeError("the FMU ends the simulation")
         self.time += self.call.step
 
     def run(self, run: FmuRun, rows: Rows) -> None:
         """Fill in the records of a run."""
-        call = self.call
         if run.start is not None:
             self.begin(run.start, (run.advance or run.branch)[0])
         for inputs in run.advance:
             self.step(inputs)
         kept, time = self.fmu.getFMUState() if run.returns else None, self.time
-        rows.append(self.get(call.outputs))
+        rows.append(self.get(self.call.outputs))
         for place, inputs in enumerate(run.branch, 1):
             self.step(inputs)
-            if place % call.every == 0:
-                rows.append(self.get(call.outputs))
+            if place % self.call.every == 0:
+                rows.append(self.get(self.call.outputs))
         if kept is not None:
             self.fmu.setFMUState(kept)
             self.fmu.freeFMUState(kept)
@@ -168,19 +158,17 @@ class FmuInstance:
 
 
 def _serve(connection: Connection, folder: str) -> None:
-    """Answer one request: a line that the FMU is loaded, then the records and the fault of each run."""
+    """Answer one request with the records and the fault of each run."""
     call, runs = connection.recv()
-    one, sound = FmuInstance(folder, call), True
-    connection.send((None, ""))
+    one, fault = FmuInstance(folder, call), ""
     for run in runs:
         rows: Rows = []
         try:
-            if run.start is None and not sound:
-                raise RuntimeError("failed before")
-            one.run(run, rows)
-            fault, sound = "", True
+            if run.start is not None or not fault:  # else what it goes on from has failed
+                fault = ""
+                one.run(run, rows)
         except Exception as error:
-            fault, sound = f"{error} at {one.time:g} s", False
+            fault = f"{error} at {one.time:g} s"
         sys.stdout.flush()
         connection.send((rows, fault))
 
