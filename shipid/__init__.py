@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.data.windows import Instants as Instants, Windows as Windows, cut_windows as cut_windows
     from shipid.engine.rollout import Trajectories as Trajectories, rollout as rollout
     from shipid.errors import ShipidError as ShipidError
+    from shipid.foundations.predictions import prediction_table as prediction_table
     from shipid.hybrid.alone import Alone as Alone
     from shipid.hybrid.learned_force import LearnedForce as LearnedForce
     from shipid.hybrid.method import Case as Case, FitResult as FitResult, Task as Task
@@ -52,7 +53,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.study.results import Results as Results, read_cells as read_cells, read_results as read_results
     from shipid.study.run import run_study as run_study
     from shipid.study.screen import screen as screen
-    from shipid.study.windows import prediction_table as prediction_table, windows as windows
+    from shipid.study.windows import windows as windows
     from shipid.vessel.load import Vessel as Vessel, load_vessel as load_vessel
     from shipid.vessel.perturb import (
         Family as Family,
@@ -104,7 +105,7 @@ _PUBLIC = {
     "draw_members": "shipid.vessel.perturb",
     "perform_manoeuvres": "shipid.simulation.perform",
     "position_error": "shipid.metrics",
-    "prediction_table": "shipid.study.windows",
+    "prediction_table": "shipid.foundations.predictions",
     "read_cells": "shipid.study.results",
     "read_families": "shipid.simulation.families",
     "verify_lock": "shipid.simulation.families",

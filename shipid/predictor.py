@@ -37,6 +37,7 @@ from shipid.hybrid.method import Case, Index, Method, Task, fit_all, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.novelty import NoveltyAlarm, alarm_inputs, calibrate_alarm
 from shipid.hybrid.physics import Physics, check_columns, check_instants
+from shipid.hybrid.simulated import physics_entry, physics_of_entry
 from shipid.hybrid.stored import StoredData
 from shipid.metrics import vector_lengths
 from shipid.observer import AGE_COLUMN, Observer
@@ -45,7 +46,7 @@ from shipid.simulation.log import state_column
 from shipid.units import percent_text
 from shipid.users import error_location, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
-from shipid.vessel.load import Vessel, check_document
+from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 Part = TypeVar("Part", bound=StoredData)
@@ -294,7 +295,7 @@ class Predictor(DeployedMethod):
         corrector, arrays = self._corrector_parts()
         header = {
             "format": FORMAT,
-            "vessel": None if self.vessel is None else {"document": self.vessel.document, "file": self.vessel.file},
+            "vessel": physics_entry(self.physics),
             "horizon": self.physics.horizon,
             "step": self.physics.step,
             "integrator": self.physics.integrator,
@@ -397,13 +398,13 @@ class Predictor(DeployedMethod):
             )  # the arrays left are the method's
             made = MeanCorrector if "mean_of" in header["corrector"] else METHODS[kind].corrector
             loaded = cls(
-                physics=Physics(
-                    None if vessel is None else check_document(vessel["document"], vessel["file"]),
-                    known.horizon,
-                    known.step,
-                    known.integrator,
-                    None if header["observer"] is None else Observer(**header["observer"]),
-                    known.path,
+                physics=physics_of_entry(
+                    vessel,
+                    horizon=known.horizon,
+                    step=known.step,
+                    integrator=known.integrator,
+                    observer=None if header["observer"] is None else Observer(**header["observer"]),
+                    path=known.path,
                 ),
                 method=kind,
                 corrector=made.from_arrays(header["corrector"], arrays),
@@ -511,7 +512,7 @@ def fit(
     check_mapping("kinds", kinds, "the name of a run to a kind of manoeuvre", DataError)
     seed, refits = check_whole_number("seed", seed, 0, DataError), check_whole_number("refits", refits, 0, DataError)
     _check_fit(method, kind, physics, windows)
-    name = "physics" if physics.vessel is not None else "none"
+    name = "none" if physics.absent else "physics"
     paths, diverged = physics.variant_paths(windows.instants(known=commands == "known"))
     if diverged.any():
         raise DataError(
@@ -545,7 +546,7 @@ def _check_fit(method: Method, kind: str, physics: Physics, windows: Windows) ->
     if method.past > windows.num_past * windows.step + 1e-9:
         steps = math.ceil(method.past / windows.step - 1e-9)
         raise DataError(f"the method needs a past of {method.past:g} s: cut windows with past = {steps}")
-    if physics.vessel is None and not method.meets_none:
+    if physics.absent and not method.meets_none:
         raise DataError(f"the method {kind!r} needs a vessel: the physics has none")
     if physics.observer is not None:
         raise DataError("windows hold no estimates of an observer: run a study, or fit the method on a Task with them")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.data.windows import constant_motion
 from shipid.files import read_json
 from shipid.hybrid.bands import Region
 from shipid.metrics import (
@@ -27,7 +28,6 @@ from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import grid_seeds, learns_from_runs, vessels_of
-from shipid.study.prepare import constant_motion
 from shipid.study.results import Results
 from shipid.vessel.outline import ship_outline
 
@@ -168,7 +168,7 @@ def commands_frame(results: Results) -> pd.DataFrame:
 def window_snapshots(results: Results) -> list[WindowSnapshot]:
     """Windows of the shown test runs, spread over each run, with every model's paths of the first seed."""
     particulars: Mapping[str, float] = next(
-        (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
+        (one.vessel.document.get("particulars", {}) for one in results.plan.foundations if one.vessel), {}
     )
     test, level, origin = results.test, results.plan.study.bands.level, np.zeros((1, 2))
     paths: dict[PathKey, np.ndarray] = {("", "naive", 0): constant_motion(test)}

@@ -23,6 +23,7 @@ Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/q
 Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
 Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
 Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]
+Trust = Annotated[bool, typer.Option("--trust", help="run code that the study names, such as that of a function")]
 Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 
 

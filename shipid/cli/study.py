@@ -12,7 +12,17 @@ import typer
 
 import shipid
 from shipid.cli.answer import Answer, Json, open_answer
-from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, document_stem, parse_changes
+from shipid.cli.options import (
+    Changes,
+    Device,
+    Folder,
+    Scheduler,
+    StudyName,
+    Trust,
+    Workers,
+    document_stem,
+    parse_changes,
+)
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import end_on_interrupt, share_text, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
@@ -140,6 +150,7 @@ def study_run(
     shard: Annotated[
         str | None, typer.Option(help="i/n: every n-th unit of work from the i-th on, after `study prepare`")
     ] = None,
+    trust: Trust = False,
 ) -> None:
     """Run a study and write its report; an interrupted run resumes when started again."""
     from shipid.study.workers import import_for_workers
@@ -151,7 +162,7 @@ def study_run(
     part = re.fullmatch(r"(\d+)/(\d+)", shard or "")
     if shard is not None and part is None:
         raise ShipidError(f"{shard!r}: write i/n, such as 3/20", path="--shard")
-    plan = shipid.read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes), trust=trust)
     _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, part and (int(part[1]), int(part[2])))
 
 
@@ -161,12 +172,13 @@ def study_prepare(
     out: Annotated[Path | None, typer.Option(help="folder; default results/<study>-<digest>")] = None,
     changes: Changes = None,
     device: Device = "cpu",
+    trust: Trust = False,
 ) -> None:
     """Make the folder of a study with its runs, so that the tasks of a job array can work there with --shard."""
     from shipid.study.plan import default_folder
     from shipid.study.run import prepare_study
 
-    plan = shipid.read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes), trust=trust)
     for event in prepare_study(plan, out or default_folder(plan), device=device):
         typer.echo(event.text)
 
@@ -177,11 +189,12 @@ def study_resume(
     workers: Workers = None,
     scheduler: Scheduler = None,
     device: Device = "cpu",
+    trust: Trust = False,
 ) -> None:
     """Continue an interrupted run."""
     from shipid.study.store import stored_plan
 
-    _run_to_report(stored_plan(folder), folder, workers, scheduler, device)
+    _run_to_report(stored_plan(folder, trust), folder, workers, scheduler, device)
 
 
 @app.command("report")
@@ -214,10 +227,14 @@ def study_windows(
         bool, typer.Option("--with-truth", help='with the future of the test; scores are then "not blind"')
     ] = False,
     device: Device = "cpu",
+    every: Annotated[
+        bool, typer.Option("--every", help="of all runs, and what a memory asks for: for `predictions` of a family")
+    ] = False,
+    trust: Trust = False,
 ) -> None:
     """Write the windows of a study for a method of your own: what is known, what the physics says, what it misses."""
     folder = check_output(out / "windows.parquet", option="--out").parent
-    cut = shipid.windows(study, N_D=N_D, seed=seed, with_truth=with_truth, device=device)
+    cut = shipid.windows(study, N_D=N_D, seed=seed, with_truth=with_truth, device=device, every=every, trust=trust)
     for file in cut.write(folder):
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
 

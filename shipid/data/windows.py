@@ -54,6 +54,7 @@ class Instants:
     hidden : states of actuators at the instant, name -> (S,); None takes each actuator as having reached its order.
     estimates : what an observer knows at the instant, `observer.u`, ... -> (S,); empty without an observer.
     step : time [s] between the entries of past and planned; None: that of the predictor.
+    run, t : name of the run of each instant and its time on the clock of the run [s], (S,); None where nobody knows.
     """
 
     columns: Mapping[str, NDArray[Any]] = field(repr=False)
@@ -62,6 +63,8 @@ class Instants:
     hidden: Mapping[str, Array] | None = field(default=None, repr=False)
     estimates: Mapping[str, Array] = field(default_factory=dict, repr=False)
     step: float | None = None
+    run: NDArray[np.str_] | None = field(default=None, repr=False)
+    t: Array | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.columns["u"])
@@ -80,6 +83,8 @@ class Instants:
             last(self.hidden),
             last(self.estimates) or {},
             self.step,
+            None if self.run is None else self.run[chosen],
+            None if self.t is None else self.t[chosen],
         )
 
 
@@ -135,7 +140,8 @@ class Windows:
         estimates: Mapping[str, Array] | None = None,
     ) -> Instants:
         """Input of a predictor: no future, except for the commands where they are `known` over the horizon."""
-        return Instants(self.columns, self.past, self.planned if known else None, hidden, estimates or {}, self.step)
+        planned = self.planned if known else None
+        return Instants(self.columns, self.past, planned, hidden, estimates or {}, self.step, self.run, self.t)
 
     @property
     def spans(self) -> dict[str, tuple[float, float]]:
@@ -569,3 +575,13 @@ def nested_runs(runs: Iterable[str], amounts: Iterable[int], seed: int) -> dict[
     if wanted and not 1 <= wanted[0] <= wanted[-1] <= len(drawn):
         raise DataError(f"amounts {wanted} cannot be drawn from {len(drawn)} runs: choose 1 to {len(drawn)}")
     return {amount: tuple(drawn[:amount]) for amount in wanted}
+
+
+def constant_motion(windows: Windows) -> Array:
+    """Paths (T, S, 2) [m] in the frame (11) if u, v, r stayed as they are: exact arcs, straight as r goes to 0."""
+    u, v, r = (windows.columns[name] for name in ("u", "v", "r"))
+    time = windows.step * np.arange(1, windows.horizon + 1)[:, None]
+    half = r * time / 2
+    chord = time * np.sinc(half / np.pi)  # integral of cos and sin over a turn of 2 half
+    along, across = chord * np.cos(half), chord * np.sin(half)
+    return np.asarray(np.stack([u * along - v * across, u * across + v * along], axis=-1))

@@ -17,7 +17,7 @@ from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.method import Array
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Needs, Physics
 from shipid.hybrid.search import Scale
 
 TRAJECTORY_SIGNALS = ("x", "y", "u", "v", "r")
@@ -35,7 +35,7 @@ class TrajectoryInputs(Inputs):
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return the inputs (S,) that the physics gives; a trajectory that diverged gives zeros."""
         inputs = super().of_physics(physics, instants)
-        if physics.vessel is None:
+        if physics.absent:
             return inputs
         states = physics.states(instants)
         with np.errstate(invalid="ignore"):
@@ -65,6 +65,7 @@ class Calibrator(PathDrawn):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (*PathDrawn.SEARCHED, "physics_scale")
+    needs: ClassVar[Needs] = "motion"
     meets_none: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = TrajectoryCompensator
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat, field_validator
 
 from shipid.checked import CheckedModel
-from shipid.data.windows import Instants, to_frame
+from shipid.data.windows import Instants, from_frame, to_frame
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
 from shipid.physics.signals import direct_inputs, measurable_signals, rows_of_role
@@ -151,7 +151,7 @@ class Inputs:
 
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
-        if physics.vessel is None:
+        if physics.absent:
             return {}
         table = observer_inputs(instants) if self.memory.observer and physics.observer is not None else {}
         for seconds in self.memory.error:
@@ -206,20 +206,25 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     """Errors (S,) at the instants of a prediction by the physics from `seconds` before, with the commands given since.
 
     x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
-    velocities [m/s, rad/s]. A prediction that diverged gives zeros.
+    velocities [m/s, rad/s], where the physics says them. A prediction that diverged gives zeros.
     """
     steps = count_steps(seconds, physics.step)
     past, columns = instants.past, instants.columns
     value_before(instants, "x", seconds, physics.step)
     then = {name: values[-steps] for name, values in past.items()}
     given = {name: values[-steps:] for name, values in past.items() if "." in name}
-    before = replace(physics, horizon=steps)
-    ends = {name: values[-1] for name, values in before.states(Instants(then, planned=given)).items()}
+    if physics.vessel is None:  # a simulator is asked where the ship was
+        places = from_frame(then["x"], then["y"], *(columns[name] for name in ("north", "east", "psi")))
+        then |= dict(zip(("north", "east"), places, strict=True))
+    before, t = replace(physics, horizon=steps), None if instants.t is None else instants.t - steps * physics.step
+    begun = Instants(then, planned=given, run=instants.run, t=t)
+    ends = {name: values[-1] for name, values in before.states(begun).items()}
     turned = columns["psi"] - then["psi"]
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
     dx, dy = x0 - ends["x"], y0 - ends["y"]
     c, s = np.cos(turned), np.sin(turned)
-    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx, **{name: columns[name] - ends[name] for name in MOTIONS}}
+    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
+    errors |= {name: columns[name] - ends[name] for name in MOTIONS if name in ends}
     sound = np.isfinite(np.stack(list(errors.values()))).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}
 

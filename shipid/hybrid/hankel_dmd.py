@@ -83,7 +83,7 @@ def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple
         raise DataError(f"the method needs {delays} steps of the past, there are {held}", path="u")
     past = {name: values[held - delays :] for name, values in instants.past.items()}
     rows = {name: past[name] for name in (*MOTIONS, *commands)}
-    if physics.vessel is None:
+    if physics.absent:
         return rows
     given = {name: values for name, values in past.items() if "." in name}
     then = Instants({name: values[0] for name, values in past.items()}, planned=given)
@@ -138,7 +138,7 @@ class HankelProblem(StepProblem):
         past = past_rows(physics, self.task.instants(self.name), delays, self.task.commands)
         motion = true_motion(windows)
         later = {**motion, **windows.planned}
-        if physics.vessel is not None:
+        if not physics.absent:
             instants = windows.instants(known=True, hidden=self.task.hidden.get(self.name))
             later |= missed_steps(physics, instants, motion)
         at, before = delays + steps.number, {}

@@ -19,7 +19,7 @@ from shipid.data.windows import Instants
 from shipid.document import LEAST_NUMBER
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Array, Index, Task
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Needs, Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, ridge_values, seed_of
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import StoredData
@@ -114,6 +114,7 @@ class LearnedForce(SearchedAlone):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
     CHAINED: ClassVar[bool] = True
+    needs: ClassVar[Needs] = "equations"
     meets_none: ClassVar[bool] = False
     problem: ClassVar[type[LearningProblem]] = ForceProblem
     corrector: ClassVar[type[Any]] = ForceCorrector

@@ -19,7 +19,7 @@ from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.method import Array
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
-from shipid.vessel.load import check_document
+from shipid.hybrid.simulated import physics_entry, physics_of_entry
 
 SUM = 1e4  # weight, of the size of the errors, with which weights are held to the sum 1
 
@@ -74,7 +74,7 @@ class MeanCorrector:
         """Rebuild what `header` and `arrays` gave."""
         parts = []
         for number, part in enumerate(header["mean_of"]):
-            physics = Physics(check_document(part["document"], part["file"]), **part["physics"])
+            physics = physics_of_entry(part, **part["physics"])
             own = arrays_with_prefix(arrays, f"{number}.")
             corrector = METHODS[part["method"]].corrector.from_arrays(part["corrector"], own)
             parts.append(DeployedMethod(physics, part["method"], corrector))
@@ -82,11 +82,10 @@ class MeanCorrector:
 
 
 def _part_header(part: DeployedMethod) -> dict[str, Any]:
-    physics, vessel = part.physics, part.physics.ship
+    physics = part.physics
     names = ("horizon", "step", "integrator", "path")
     return {
-        "document": vessel.document,
-        "file": vessel.file,
+        **(physics_entry(physics) or {}),
         "physics": {name: getattr(physics, name) for name in names},
         "method": part.method,
         "corrector": part.corrector.header(),

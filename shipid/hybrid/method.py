@@ -18,7 +18,7 @@ from shipid.document import parse_model
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.features import NO_MEMORY, Inputs, Memory
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Needs, Physics
 from shipid.users import locate_errors
 from shipid.vessel.load import Vessel
 
@@ -172,6 +172,7 @@ class Method(CheckedModel, BaseModel, ABC):
     compensates : whether anything is learned from data.
     meets_none : whether it works without physics.
     meets_observer : whether it starts from the filtered state of physics with an observer, under the slow force.
+    needs : what it asks of the physics, see `shipid.hybrid.physics.Needs`.
     corrector : the class that a saved predictor is rebuilt with.
     """
 
@@ -180,6 +181,7 @@ class Method(CheckedModel, BaseModel, ABC):
     compensates: ClassVar[bool] = True
     meets_none: ClassVar[bool] = True
     meets_observer: ClassVar[bool] = True
+    needs: ClassVar[Needs] = "path"
     corrector: ClassVar[type[Any]]
 
     @property
@@ -244,6 +246,22 @@ class TrialRow(BaseModel):
         return self
 
 
+NEEDED: dict[Needs, str] = {
+    "path": "paths",
+    "motion": "psi, u, v, r along the path",
+    "steps": "single steps from any state, which a function gives",
+    "equations": "the equations of a vessel",
+}
+"""What a method needs -> what the physics must give, in words."""
+
+
+def misfit_words(method: Method, gives: Sequence[Needs], vessel: Vessel | None) -> str:
+    """Why a method cannot work with physics that gives this; empty where it can."""
+    if method.needs not in gives:
+        return f"the method needs {NEEDED[method.needs]}: take one that works on the path, such as kernel or path-drawn"
+    return "" if vessel is None else method.unfit(vessel)
+
+
 def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
     """Fit every foundation of a task.
 
@@ -251,8 +269,8 @@ def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
     in the code of a user.
     """
     name, shape = type(method).__name__, task.windows.future.shape
-    for vessel in (case.physics.vessel for case in task.cases.values()):
-        if vessel is not None and (words := method.unfit(vessel)):
+    for physics in (case.physics for case in task.cases.values()):
+        if words := misfit_words(method, physics.gives, physics.vessel):
             raise DataError(words)
     with locate_errors(f"{name}.fit", type(method)):
         given = method.fit(task)

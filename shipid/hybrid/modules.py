@@ -22,7 +22,7 @@ from shipid.hybrid.bands import nearest_distances
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Array, Index, Task
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Needs, Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale, seed_of
 from shipid.hybrid.stepping import StepMethod, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import StoredData
@@ -187,6 +187,7 @@ class Modules(StepMethod):
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
+    needs: ClassVar[Needs] = "equations"
     meets_none: ClassVar[bool] = False
     problem: ClassVar[type[LearningProblem]] = ModulesProblem
     corrector: ClassVar[type[Any]] = ModulesCorrector

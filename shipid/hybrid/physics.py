@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -35,6 +35,8 @@ ESTIMATED = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS)
 REPEATED_FROM = 5_000  # steps of one rollout: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
+Needs = Literal["path", "motion", "steps", "equations"]
+"""What a method asks of the physics: its paths, u, v, r and psi along them, starts from any state, or equations."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,16 @@ class Physics:
         return self if self.vessel is None else replace(self, vessel=self.vessel.with_values(values))
 
     @property
+    def gives(self) -> tuple[Needs, ...]:
+        """What a method may ask of it."""
+        return get_args(Needs)
+
+    @property
+    def absent(self) -> bool:
+        """Whether there is no physics, so that all paths are zero."""
+        return self.vessel is None
+
+    @property
     def ship(self) -> Vessel:
         """The vessel; ShipidError where there is none."""
         if self.vessel is None:
@@ -91,7 +103,7 @@ class Physics:
         if self.vessel is None:
             return np.zeros((self.horizon, 1, len(instants), 2)), np.zeros((1, len(instants)), bool)
         result, (north, east), lost = self._rollout(instants, ("north", "east"), parameters, device)
-        paths = np.stack(_positions_in_frame(instants, north, east), axis=-1)
+        paths = np.stack(positions_in_frame(instants, north, east), axis=-1)
         begun = self.step * np.stack([instants.columns.get(name, 0 * lost) for name in ("u", "v")], axis=-1)
         bad, limit = result.diverged, SPEED_LIMIT * self.step
         paths[:, bad] = hold_velocity(paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad], limit)
@@ -106,7 +118,7 @@ class Physics:
         kept = ("north", "east", *MOTION, *leaning)
         result, (north, east), lost = self._rollout(instants, kept, None, "cpu", engine)
         lost = np.where(result.diverged[0], np.nan, lost)
-        x, y = _positions_in_frame(instants, north[:, 0] + lost, east[:, 0] + lost)
+        x, y = positions_in_frame(instants, north[:, 0] + lost, east[:, 0] + lost)
         motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
         if leaning:
             with np.errstate(all="ignore"):  # a path that diverged
@@ -274,7 +286,7 @@ def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:
     return columns.get("north", zero), columns.get("east", zero), columns.get("psi", zero)
 
 
-def _positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
+def positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
     """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged may not be finite."""
     with np.errstate(all="ignore"):  # it is flagged, and no news to the caller
         return to_frame(north, east, *_place_of_instants(instants))

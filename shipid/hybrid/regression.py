@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 from shipid.data.windows import Instants, choose_evenly
 from shipid.hybrid.features import MOTIONS, feature_table
 from shipid.hybrid.method import Array, FitResult, Index, Method, Task
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Needs, Physics
 from shipid.hybrid.search import best_trials, trial_row, windows_of_folds
 from shipid.hybrid.stepping import Stepper, step_alone, stepped_paths, true_motion
 from shipid.hybrid.stored import StoredData
@@ -135,7 +135,7 @@ class RegressionProblem:
         )
         self.missing = np.stack([motion[key][1:].ravel() for key in MOTIONS], axis=1) - step_alone(self.physics, at)
         self.seen = VaryingInputs.of(self.table, mirror=True)
-        self.currents = [np.zeros(2)] if self.physics.vessel else [np.zeros(2), self.fit_current()]
+        self.currents = [np.zeros(2), self.fit_current()] if self.physics.absent else [np.zeros(2)]
 
     def steps(self, current: Array) -> tuple[Array, Array]:
         """Terms (N, S, M) and missing accelerations (N, S, 3): means over steps, with their images in the mirror."""
@@ -196,6 +196,7 @@ class Regression(Method):
     """
 
     validation: ClassVar[str] = "runs"
+    needs: ClassVar[Needs] = "steps"
     meets_observer: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = RegressionCorrector
 

@@ -19,7 +19,7 @@ from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Array, Index, Task
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import Needs, Physics
 from shipid.hybrid.search import (
     LearningProblem,
     Point,
@@ -63,7 +63,7 @@ def step_alone(physics: Physics, at: Instants) -> Array:
 
 def _step_and_way(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not known."""
-    if physics.vessel is None:
+    if physics.absent:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
     engine = REPEATED if len(at) * physics.horizon > STEPWISE_FROM else AUTO
     states = replace(physics, horizon=1).states(at, engine=engine)
@@ -206,6 +206,7 @@ class StepMethod(SearchedAlone):
 
     RIDGES: ClassVar[int] = 8
     IDLE: ClassVar[frozenset[str]] = frozenset({"ridge"})
+    needs: ClassVar[Needs] = "steps"
     meets_observer: ClassVar[bool] = False
 
     ridge: Scale

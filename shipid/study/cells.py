@@ -82,7 +82,7 @@ def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
     mine = {name: work.known[name] for name in way.foundations if not work.known[name].foundation.mean_of}
     cases = {
-        name: Case(physics_of(prepared.study, one.foundation.vessel, one.foundation.observer), one.paths)
+        name: Case(physics_of(prepared.study, one.foundation.source, one.foundation.observer), one.paths)
         for name, one in mine.items()
     }
     hidden = {
@@ -328,7 +328,7 @@ def _predictor(
     windows, study = work.windows, work.prepared.study
     named = {"cell": work.batch.cell(foundation.name, way.name), "foundation": foundation.name, "method": way.name}
     return Predictor(
-        physics=physics_of(study, foundation.vessel, foundation.observer),
+        physics=physics_of(study, foundation.source, foundation.observer),
         method=way.kind,
         corrector=corrector,
         limits=limits_of(windows, work.prepared.commands),

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from shipid import document as documents
-from shipid.errors import DocumentError, suggest_name
-from shipid.hybrid.method import Method
+from shipid.errors import DocumentError, ShipidError, suggest_name
+from shipid.foundations import SIMULATORS
+from shipid.hybrid.method import Method, misfit_words
 from shipid.hybrid.methods import method_of
+from shipid.hybrid.physics import Needs
+from shipid.hybrid.simulated import Simulator
 from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
 from shipid.study.schema import PAIRED_ROLES, MeanBlock, Study
@@ -27,7 +30,7 @@ class Foundation:
     """What the physics says: a variant of a vessel, a variant identified from the runs of each batch, or nothing.
 
     variant : the numbers on the base; None is no physics at all.
-    base : the vessel that the variant changes.
+    base : the vessel, or the simulator of somebody else, that the variant changes.
     identify : what is identified from the runs of each batch; None: nothing.
     observer : what filters the start of the physics and adds slow forces; None: nothing.
     mean_of : foundations of whose compensated paths it is the mean, without physics of its own.
@@ -38,7 +41,7 @@ class Foundation:
     family: str
     member: int
     variant: Variant | None
-    base: Vessel | None
+    base: Vessel | Simulator | None
     description: str = ""
     identify: Identify | None = None
     observer: Observer | None = None
@@ -52,6 +55,12 @@ class Foundation:
 
     @property
     def vessel(self) -> Vessel | None:
+        """The vessel with the numbers of the variant; None where it has no equations."""
+        source = self.source
+        return source if isinstance(source, Vessel) else None
+
+    @property
+    def source(self) -> Vessel | Simulator | None:
         """The base with the numbers of the variant."""
         if self.base is None or self.variant is None:
             return None
@@ -84,27 +93,60 @@ def named_vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> 
     return known[name]
 
 
-def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
+def bases_of(
+    family: Family, file: Path, path: str, known: dict[str, Vessel], simulators: dict[str, Simulator], trust: bool
+) -> list[Vessel | Simulator]:
+    """What the members of a family change: a vessel, a function, or tables, of which each is a member.
+
+    simulators : those that are known, by `key`, to which those that are read now are added.
+    """
+    if family.base is not None:
+        return [change_structure(family, named_vessel(family.base, file, f"{path}.base", known))]
+    kind, value = next((kind, value) for kind in SIMULATORS if (value := getattr(family, kind)) is not None)
+    names = [value] if isinstance(value, str) else value
+    if any(name not in simulators for name in names):
+        try:
+            simulators |= {one.key: one for one in SIMULATORS[kind].read(value, file.parent, trust)}
+        except ShipidError as error:
+            words = f"{error.path}: {error.message}" if error.path else error.message
+            raise DocumentError(f"{error.file}: {words}" if error.file else words, path=f"{path}.{kind}") from None
+    if family.structure or (family.perturb and kind == "predictions"):
+        raise DocumentError(f"{kind} has no structure, and a table no numbers: leave it out", path=f"{path}.{kind}")
+    return [simulators[name] for name in names]
+
+
+def foundations_of(
+    study: Study, file: Path, known: dict[str, Vessel], simulators: dict[str, Simulator], trust: bool = False
+) -> tuple[Foundation, ...]:
     """Every member of every family; an identified family has the members of the family that it extends."""
     families = resolve_families(study.family, file)
     foundations: list[Foundation] = []
     for index, family in enumerate(families):
-        assert family.base is not None  # written out by resolve
         if family.name.lower() == NO_MODEL:
             raise DocumentError("this name is taken by the foundation without physics", path=f"family.{index}.name")
-        vessel = change_structure(family, named_vessel(family.base, file, f"family.{index}.base", known))
+        bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
+        vessel = bases[0] if isinstance(bases[0], Vessel) else None
         parent = families[_root(study.family, index)]
-        identify = None if family.identify is None else _identify(study, family, index, vessel)
-        observer = None if family.observer is None else _observer(study, family, index, vessel)
+        for block in ("identify", "observer") if vessel is None else ():
+            if getattr(family, block) is not None:
+                words = "it needs the equations of a vessel, and this family has none: take a family with a base"
+                raise DocumentError(words, path=f"family.{index}.{block}")
+        identify = None if family.identify is None or vessel is None else _identify(study, family, index, vessel)
+        observer = None if family.observer is None or vessel is None else _observer(study, family, index, vessel)
         ways = (parent.description, IDENTIFIED if identify else "", OBSERVED if observer else "")
         words = family.description or ", ".join(filter(None, ways))
-        for variant in draw_members(parent, vessel, file):
+        if len(bases) > 1:
+            parent = parent.model_copy(update={"members": len(bases)})
+        drawn = [
+            (base, variant)
+            for place, base in enumerate(bases)
+            for variant in draw_members(parent, base, file, None if len(bases) == 1 else [place])
+        ]
+        for base, variant in drawn:
             name = variant.name
             if parent is not family:
                 name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
-            foundations.append(
-                Foundation(name, family.name, variant.member, variant, vessel, words, identify, observer)
-            )
+            foundations.append(Foundation(name, family.name, variant.member, variant, base, words, identify, observer))
     foundations += [
         _mean_of_foundations(block, f"model.{place}", foundations) for place, block in enumerate(study.model)
     ]
@@ -217,7 +259,8 @@ def methods_of(study: Study, foundations: Sequence[Foundation]) -> tuple[StudyMe
             met -= {NO_MODEL}
         taken = [f for f in foundations if f.family in met - refused]
         for family, base in {f.family: f.base for f in taken if f.base is not None}.items():
-            if words := method.unfit(base):
+            given = (base.gives, None) if isinstance(base, Simulator) else (get_args(Needs), base)
+            if words := misfit_words(method, *given):
                 raise DocumentError(f"{family} with {block.kind}: {words}", path=path)
         left_out = tuple(f.name for f in foundations if f.family in met & refused)
         names = [f.name for f in taken]

@@ -22,6 +22,8 @@ from shipid.capacity import excess_memory_words
 from shipid.document import Document
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.files import quote_argument
+from shipid.foundations.function import SimulatorFunction
+from shipid.hybrid.simulated import Simulator
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.families import expand_families
@@ -46,7 +48,11 @@ from shipid.vessel.schema import equation_functions
 WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
-METHOD_CODE, TERM_CODE = "code of the method", "code of the term"  # entries of a session: name -> digest
+METHOD_CODE, TERM_CODE, FUNCTION_CODE = (
+    "code of the method",
+    "code of the term",
+    "code of the function",
+)  # entries of a session: name -> digest
 USER_SCRIPT = "my.py"  # a user's script with a method or a term, where its name is unknown
 
 
@@ -103,7 +109,7 @@ class Plan:
 
     study : the checked document with the seeds of its world; `document` holds them as written.
     truth : the vessel that makes the truth, with the blocks that the study adds; None where runs were recorded.
-    vessels : every vessel that the document names, by that name.
+    vessels, simulators : every vessel and simulator that the document names, by that name.
     sources : digests of the mapping, log or dataset that recorded runs come from; `PART/dataset` where a part has
         another one.
     changes : what `--set` changed, already in the document.
@@ -121,6 +127,7 @@ class Plan:
     batches: tuple[Batch, ...] = field(repr=False)
     truth: Vessel | None = None
     vessels: Mapping[str, Vessel] = field(default_factory=dict, repr=False)
+    simulators: Mapping[str, Simulator] = field(default_factory=dict, repr=False)
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
     families: tuple[Family, ...] = field(default=(), repr=False)
@@ -150,7 +157,8 @@ class Plan:
     def digest(self) -> str:
         """Of the document, every vessel, the sources and the methods in full: what results depend on."""
         methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in self.methods]
-        vessels = sorted({vessel.digest for vessel in vessels_of(self)})
+        simulators = {one.digest for one in self.simulators.values()}
+        vessels = sorted({vessel.digest for vessel in vessels_of(self)} | simulators)
         return documents.digest_document(
             {"study": self.document, "vessels": vessels, "sources": dict(self.sources), "methods": methods}
         )
@@ -190,7 +198,7 @@ def vessels_of(plan: Plan) -> list[Vessel]:
     """The vessel of the truth, if there is one, and the bases of the foundations, of all parts too."""
     every = (plan.truth, *(foundation.base for foundation in plan.foundations))
     of_parts = (vessel for part in plan.parts.values() for vessel in vessels_of(part.plan))
-    return [*(vessel for vessel in every if vessel is not None), *of_parts]
+    return [*(vessel for vessel in every if isinstance(vessel, Vessel)), *of_parts]
 
 
 def input_files(plan: Plan) -> list[Path]:
@@ -210,7 +218,7 @@ def default_folder(plan: Plan) -> Path:
 
 def program_of(plan: Plan) -> str:
     """The command line that knows methods and terms: `shipid`, or the user's script where the user wrote one."""
-    return "shipid" if not own_code(plan) else shlex.join(["python", _script() or USER_SCRIPT])
+    return "shipid" if own_code(plan).keys() <= {FUNCTION_CODE} else shlex.join(["python", _script() or USER_SCRIPT])
 
 
 def own_code(plan: Plan) -> dict[str, dict[str, str]]:
@@ -224,10 +232,12 @@ def own_code(plan: Plan) -> dict[str, dict[str, str]]:
         METHOD_CODE: {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()},
         TERM_CODE: {key: held for one in vessels_of(plan) for key, held in equation_functions(one.document).items()},
     }
+    functions = {key: one for key, one in plan.simulators.items() if isinstance(one, SimulatorFunction)}
     own = {
         what: {name: users_code(held) for name, held in named.items() if any(map(is_user_code, held))}
         for what, named in every.items()
     }
+    own[FUNCTION_CODE] = {key: one.code_digest for key, one in functions.items()}
     return {what: digests for what, digests in own.items() if digests}
 
 
@@ -326,8 +336,10 @@ def drawn_conditions(plan: Plan) -> dict[str, Any] | None:
     return truth.model_dump(include={"seed", "manoeuvre", *weather}) if truth else None
 
 
-def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Plan:
+def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None, *, trust: bool = False) -> Plan:
     """Read a study by bundled name or path, with `--set` changes applied, and check all that can be checked now.
+
+    trust : whether code that the document names may run, such as that of a function.
 
     Raises DocumentError with file, dotted path and remedy.
     """
@@ -338,7 +350,7 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
         document = expand_families(_changed_document(document, changes or {}, "", Study.model_fields), file)
     except DocumentError as error:
         raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
-    return build_plan(document, file, changes=changes)
+    return build_plan(document, file, changes=changes, trust=trust)
 
 
 def build_plan(
@@ -347,10 +359,12 @@ def build_plan(
     vessels: Mapping[str, Vessel] | None = None,
     sources: Mapping[str, str] | None = None,
     changes: Mapping[str, Any] | None = None,
+    simulators: Mapping[str, Simulator] | None = None,
+    trust: bool = False,
 ) -> Plan:
-    """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
+    """Check a study document and expand it; known `vessels`, `sources` and `simulators` need no file."""
     try:
-        return _check_and_expand(document, file, vessels, sources, changes)
+        return _check_and_expand(document, file, vessels, sources, changes, dict(simulators or {}), trust)
     except DocumentError as error:
         raise _error_by_name(error, document, tuple(changes or ()), str(file)) from None
 
@@ -372,12 +386,14 @@ def _check_and_expand(
     vessels: Mapping[str, Vessel] | None,
     sources: Mapping[str, str] | None,
     changes: Mapping[str, Any] | None,
+    simulators: dict[str, Simulator],
+    trust: bool,
 ) -> Plan:
     documents.check_values(document, file)
     study = documents.parse_model(Study, document, file).in_its_world()
     check_ranges(document)
     known = dict(vessels or {})
-    foundations = foundations_of(study, file, known)
+    foundations = foundations_of(study, file, known, simulators, trust)
     methods = methods_of(study, foundations)
     check_claims(study, foundations)
     batches = tuple(
@@ -394,11 +410,11 @@ def _check_and_expand(
     mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
     families = tuple(resolve_families(study.family, file))
     plan = Plan(
-        *(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine),
+        *(file.stem, str(file), document, study, foundations, methods, batches, truth, known, simulators, mine),
         changes=changes or {},
         families=families,
     )
-    plan = replace(plan, parts=_parts(plan, file, known, sources))
+    plan = replace(plan, parts=_parts(plan, file, known, sources, trust))
     theirs = {
         f"{name}{OF_PART}{source}": digest
         for name, part in plan.parts.items()
@@ -408,7 +424,9 @@ def _check_and_expand(
     return replace(plan, sources={**mine, **theirs})
 
 
-def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[str, str] | None) -> dict[str, Part]:
+def _parts(
+    plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[str, str] | None, trust: bool
+) -> dict[str, Part]:
     """Every repetition in every condition: `constant-1`, ...; DocumentError with the path of the cause."""
     repeat, conditions = plan.study.repeat, plan.study.condition
     if not repeat and not conditions:
@@ -425,7 +443,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             mine: dict[str, Any] = {} if condition is None else condition.set
             changed = _changed_document(bare, mine, f"condition.{place}.set.", blocks)
             changed = _changed_document(changed, turn, "repeat.", blocks)
-            part = build_plan(changed, file, known, plan.sources)
+            part = build_plan(changed, file, known, plan.sources, simulators=plan.simulators, trust=trust)
             if part.study.data != plan.study.data:
                 part = replace(part, sources=_of_part(name, part, sources))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)

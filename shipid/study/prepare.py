@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid import document as documents
 from shipid.capacity import excess_memory_words
 from shipid.data.causal import causal_columns
 from shipid.data.checks import copies_of_earlier_runs
@@ -31,6 +32,7 @@ from shipid.data.windows import (
     PathSource,
     Windows,
     coarse_in_words,
+    constant_motion,
     cut_windows,
     gaps_of_runs,
     longest_gap_in_words,
@@ -42,9 +44,11 @@ from shipid.data.windows import (
 )
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
+from shipid.hybrid.features import count_steps
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics, check_columns, missing_columns
 from shipid.hybrid.regression import Regression
+from shipid.hybrid.simulated import SimulatedPhysics, Simulator
 from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
@@ -259,9 +263,14 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
             f"runs that move as others do ({copies}): errors and intervals take them for new: leave out copies"
         )
     for foundation in plan.foundations:
-        if foundation.base is not None:
+        if isinstance(foundation.base, Vessel):
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
+        elif foundation.base is not None:
+            place = f"family.{foundation.family}.predictions"
+            meant = any(documents.match_paths(str(one), [place]) for one in plan.study.unusual)
+            remedy = "" if meant else f'if it is meant so, write unusual = ["{place}"] at the top of the study'
+            foundation.base.check(rest, test, steps_before(plan, foundation.name), remedy)
     for way in plan.methods:
         if absent := [name for name in way.method.traits.memory.states if name not in test.columns]:
             raise DocumentError(
@@ -289,7 +298,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
 
 def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
     """Put the commands in the order of the first vessel, others last: a drawn network depends on it as on a seed."""
-    vessel = next((one.base for one in plan.foundations if one.base is not None), None)
+    vessel = next((one.base for one in plan.foundations if isinstance(one.base, Vessel)), None)
     order = () if vessel is None else vessel_dynamics(vessel).commands
     places = {name: place for place, name in enumerate(order)}
     commands = sorted(dataset.commands, key=lambda name: (places.get(name, len(order)), name))
@@ -345,7 +354,8 @@ def _roll_out(
         for foundation, paths in _one_round(study, dataset, parts, waiting, device, known):
             family, lost = families[foundation.family], int(paths.diverged[0].sum())
             words = f"{foundation.name} diverges on {percent_text(lost / len(parts[0]), 1)} of the training windows"
-            if lost and (family.redraw or not any(block.drawn for block in family.perturb)):
+            fixed = foundation.vessel is not None and not any(block.drawn for block in family.perturb)
+            if lost and (family.redraw or fixed):
                 again.append(_redraw(foundation, family, words, plan.file, notes))
                 continue
             finished[foundation.name] = (foundation, paths)
@@ -367,10 +377,19 @@ def _roll_out(
     return foundations, {one.name: finished[one.name][1] for one in foundations}
 
 
-def physics_of(study: Study, vessel: Vessel | None, observer: Observer | None = None) -> Physics:
-    """The physics of a study: a vessel, rolled out over the horizon of the study."""
-    prediction = study.prediction
-    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator, observer, path_source(study))
+def physics_of(study: Study, source: Vessel | Simulator | None, observer: Observer | None = None) -> Physics:
+    """The physics of a study: a vessel or a simulator over the horizon of the study, or none."""
+    ahead, path = study.prediction, path_source(study)
+    if isinstance(source, Simulator):
+        return SimulatedPhysics(None, ahead.horizon, ahead.step, ahead.integrator, None, path, simulator=source)
+    return Physics(source, ahead.horizon, ahead.step, ahead.integrator, observer, path)
+
+
+def steps_before(plan: Plan, foundation: str) -> list[int]:
+    """Numbers of steps before a window from which a method that meets the foundation takes the error of the physics."""
+    memories = [way.method.traits.memory for way in plan.methods if foundation in way.foundations]
+    step = plan.study.prediction.step
+    return sorted({count_steps(seconds, step) for memory in memories for seconds in memory.error})
 
 
 def known_by_then(study: Study, dataset: Dataset) -> Dataset:
@@ -466,7 +485,9 @@ def _one_round(
     alike: dict[Alike, list[tuple[Foundation, Vessel]]] = {}
     for foundation in foundations:
         vessel = foundation.vessel
-        assert vessel is not None
+        if vessel is None:  # a simulator is asked for one member at a time
+            yield foundation, paths_of(study, dataset, parts, foundation, device)
+            continue
         lags = (f"{path} {value}" for path, value in vessel.parameters.items() if ".actuator." in path)
         alike.setdefault((vessel.structure, *lags), []).append((foundation, vessel))
     for key, group in alike.items():
@@ -489,8 +510,7 @@ def paths_of(
     estimates: Estimates | None = None,
 ) -> PathsOfParts:
     """Paths of one foundation."""
-    vessel = foundation.vessel
-    physics = physics_of(study, vessel, foundation.observer)
+    vessel, physics = foundation.vessel, physics_of(study, foundation.source, foundation.observer)
     pool, test = (
         physics.variant_paths(instants_of(study, vessel, dataset, windows, estimates), None, device)
         for windows in parts
@@ -539,16 +559,6 @@ def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[st
 def states_along(vessel: Vessel, commands: Sequence[str], rows: pd.DataFrame) -> dict[str, Array] | None:
     """Hidden actuator states (n,) along one unbroken stretch of a run, modelled from its orders; None if none."""
     return memory_along(vessel, {name: rows[name].to_numpy() for name in commands}, rows["t"].to_numpy())
-
-
-def constant_motion(windows: Windows) -> Array:
-    """Paths (T, S, 2) [m] in the frame (11) if u, v, r stayed as they are: exact arcs, straight as r goes to 0."""
-    u, v, r = (windows.columns[name] for name in ("u", "v", "r"))
-    time = windows.step * np.arange(1, windows.horizon + 1)[:, None]
-    half = r * time / 2
-    chord = time * np.sinc(half / np.pi)  # integral of cos and sin over a turn of 2 half
-    along, across = chord * np.cos(half), chord * np.sin(half)
-    return np.asarray(np.stack([u * along - v * across, u * across + v * along], axis=-1))
 
 
 def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> dict[str, Array]:

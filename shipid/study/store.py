@@ -36,6 +36,8 @@ from shipid.files import (
     write_table,
     write_text,
 )
+from shipid.foundations import SIMULATORS
+from shipid.foundations.predictions import PredictionTable
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.lock import sole_writer
@@ -59,6 +61,7 @@ LENGTHS = ("A_end", "A_end_90", "A", "A_90", "A_rms", "H_end", "H_end_90", "H", 
 UNITS = {**dict.fromkeys(LENGTHS, "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
 SHARDS = "shards"
+SIMULATORS_FILE, TABLES = "simulators.json", "tables"  # those of others, and the tables of paths among them
 
 
 class Provenance(BaseModel):
@@ -155,10 +158,12 @@ def _remove_without_results(folder: Path) -> None:
 
     One that waits for its shards stays, and so does the working folder.
     """
-    made = {STUDY, VESSELS, PROVENANCE, FOUNDATIONS, DATASET, TEST, ENVELOPE}
+    made = {STUDY, VESSELS, SIMULATORS_FILE, PROVENANCE, FOUNDATIONS, DATASET, TEST, ENVELOPE}
     with sole_writer(folder):
         files = [place for place in folder.rglob("*") if not place.is_dir()]
-        mine = (file.name in made or file.parent.name == seals.FOLDER or file.suffix == ".lock" for file in files)
+        mine = (
+            file.name in made or file.parent.name in (seals.FOLDER, TABLES) or file.suffix == ".lock" for file in files
+        )
         if (folder / SHARDS).exists() or os.path.realpath(folder) == os.getcwd() or not all(mine):
             return
         with temporary_folder(folder.parent) as above:
@@ -168,15 +173,25 @@ def _remove_without_results(folder: Path) -> None:
 def _write_plan(folder: Path, plan: Plan) -> None:
     """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
-    own = {"program": program_of(plan), **own_code(plan)} if own_code(plan) else {}
+    own = {"program": program, **own_code(plan)} if (program := program_of(plan)) != "shipid" else own_code(plan)
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin, "changes": dict(plan.changes), **own})
     vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
     write_json(folder / VESSELS, vessels)
+    headers = {name: one.header() for name, one in plan.simulators.items()}
+    if headers:
+        write_json(folder / SIMULATORS_FILE, headers)
+    for name, one in plan.simulators.items():
+        if isinstance(one, PredictionTable):
+            one.require()
+            make_folder(folder / TABLES)
+            shutil.copyfile(one.file, folder / TABLES / headers[name]["file"])
     write_text(folder / STUDY, plan_text(plan))
 
 
-def stored_plan(folder: Path) -> Plan:
+def stored_plan(folder: Path, trust: bool = False) -> Plan:
     """The plan of a run from its folder alone: the study and the vessels as they were when the run began.
+
+    trust : as for `read_plan`.
 
     Raises ShipidError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
     """
@@ -184,10 +199,16 @@ def stored_plan(folder: Path) -> Plan:
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     record, document = provenance(folder), documents.read_document(folder / STUDY)
     stored, file = read_json(folder / VESSELS), folder / VESSELS
+    headers = read_json(folder / SIMULATORS_FILE) if (folder / SIMULATORS_FILE).is_file() else {}
     try:
         vessels = {name: check_document(entry["document"], entry["file"]) for name, entry in stored.items()}
         file = folder / STUDY
-        plan = build_plan(document, Path(record["file"]), vessels, record["sources"], record["changes"])
+        simulators = {
+            name: SIMULATORS[one["kind"]].from_header(one, folder / TABLES, trust) for name, one in headers.items()
+        }
+        plan = build_plan(
+            document, Path(record["file"]), vessels, record["sources"], record["changes"], simulators, trust
+        )
     except DocumentError as error:
         remedy = "if the run is of another version, read its report.html, and run the study again into a new folder"
         if "program" in record:

@@ -19,11 +19,13 @@ from shipid.data.dataset import read_dataset
 from shipid.data.windows import Windows, from_frame, join_windows
 from shipid.errors import ShipidError
 from shipid.files import write_json, write_table
+from shipid.foundations.faults import PLACES
+from shipid.foundations.predictions import KEYS, PredictionTable, long_table, prediction_table
 from shipid.physics.signals import measurable_signals
 from shipid.study import store
 from shipid.study.cells import predictions
 from shipid.study.plan import Batch, Plan, read_plan
-from shipid.study.prepare import obtain_runs, prepare
+from shipid.study.prepare import obtain_runs, prepare, steps_before
 
 Array = np.ndarray
 TRUTH_RECORD = "test-truth.json"  # in the folder of a run whose test windows went out with their future
@@ -37,6 +39,8 @@ class StudyWindows:
         The future of test windows is NaN unless they went out `with_truth`.
     keys : a row a window: run, instant [s, clock of the run], split (`train` or `test`), fold (in which it validates,
         -1 for the test). folds : (training, validation) indices of each fold, which share no moment.
+    before : numbers of steps before each window at which a method asks the physics, too; the tables then hold these
+        instants, their split is `earlier`.
     physics : foundation -> its path (T, S, 2) [m] in the frame (11); zeros without physics; as in `PreparedStudy`.
     """
 
@@ -45,6 +49,7 @@ class StudyWindows:
     folds: Sequence[tuple[Array, Array]] = field(repr=False)
     physics: Mapping[str, Array] = field(repr=False)
     with_truth: bool
+    before: Sequence[int] = ()
 
     @property
     def residual(self) -> dict[str, Array]:
@@ -88,13 +93,30 @@ class StudyWindows:
         now = {name: cut.columns[name] for name in (*names["state"], *names["wind"], *names["orders"])}
         frames = {
             "windows": self.keys.assign(**now),
-            "past": _long_table(cut, cut.step * np.arange(-cut.num_past, 0), cut.past),
+            "past": long_table(cut, cut.step * np.arange(-cut.num_past, 0), cut.past),
             "future": prediction_table(cut, cut.future, **cut.states, **cut.planned, **held),
             "physics": pd.concat(models, ignore_index=True),
         }
+        for name, keys in (("windows", KEYS[:2]), ("future", KEYS)) if self.before else ():
+            rows = pd.concat([frames[name], *(self._earlier_rows(count)[name] for count in sorted(self.before)[::-1])])
+            frames[name] = rows[~rows[keys].round(dict.fromkeys(keys[1:], 4)).duplicated()].reset_index(drop=True)
         for frame in frames.values():  # Parquet keeps it, and so do copies of a frame
             frame.attrs["shipid"] = {"with_truth": self.with_truth}
         return frames
+
+    def _earlier_rows(self, count: int) -> dict[str, pd.DataFrame]:
+        """Rows of `windows` and `future` for the instants so many steps before each window, with the orders since."""
+        cut, names = self.windows, self.names
+        then = {name: values[-count] for name, values in cut.past.items()}
+        places = from_frame(then["x"], then["y"], *(cut.columns[name] for name in (*PLACES, "psi")))
+        t = cut.t - count * cut.step
+        kept = [name for name in (*names["state"], *names["wind"], *names["orders"]) if name not in PLACES]
+        given = {name: cut.past[name][-count:] for name in names["orders"]}
+        given |= {name: np.tile(then[name], (count, 1)) for name in names["wind"]}
+        rows = long_table(replace(cut, t=t), cut.step * np.arange(1, count + 1), given)
+        keys = {"run": cut.run, "instant": t, "split": "earlier", "fold": -1}
+        now = keys | dict(zip(PLACES, places, strict=True))
+        return {"windows": pd.DataFrame(now | {name: then[name] for name in kept}), "future": rows}
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the tables as Parquet into a folder; the files. OSError where it cannot be written."""
@@ -111,6 +133,8 @@ def windows(
     seed: int | None = None,
     with_truth: bool = False,
     device: str = "cpu",
+    every: bool = False,
+    trust: bool = False,
 ) -> StudyWindows:
     """Cut the windows of a study for a method of others: those of one amount of data and seed, and those of the test.
 
@@ -121,6 +145,9 @@ def windows(
     with_truth : whether the test windows hold their future. The folder of a run remembers it, and scores of it are
         "not blind".
     device : PyTorch device of rollouts.
+    every : windows of all runs, and, `earlier`, the instants before them at which methods ask the physics: what a table
+        of `predictions` must hold.
+    trust : whether code that the study names may run.
 
     ShipidError for a study of several parts, and for an amount or a seed that the grid does not have.
     """
@@ -128,9 +155,12 @@ def windows(
         Path() if isinstance(study, Plan) else Path(study).parent if Path(study).name == store.STUDY else Path(study)
     )
     folder = place if not isinstance(study, Plan) and (place / store.PROVENANCE).is_file() else None
-    plan = study if isinstance(study, Plan) else read_plan(Path(study)) if folder is None else store.stored_plan(folder)
+    plan = study if isinstance(study, Plan) else _find_plan(Path(study), folder, trust)
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
+    if every:  # the tables that are to be made
+        others = (one for one in plan.foundations if not isinstance(one.base, PredictionTable))
+        plan = replace(plan, foundations=tuple(others))
     grid = plan.study.grid
     amount = max(grid.N_D) if N_D is None else N_D
     check_choice("N_D", str(amount), map(str, grid.N_D))
@@ -140,7 +170,7 @@ def windows(
     stored = folder is not None and (folder / store.DATASET).is_file()
     dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
     prepared = prepare(plan, dataset, device)
-    runs, known = prepared.runs(batch), plan.study.prediction.known
+    runs, known = tuple(prepared.pool.spans) if every else prepared.runs(batch), plan.study.prediction.known
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
     cut = join_windows([hide_future(train, known, True), hide_future(prepared.test, known, with_truth)])
     folds, fold = prepared.folds(batch, train, "runs"), np.full(len(cut), -1)
@@ -153,7 +183,12 @@ def windows(
     }
     if with_truth and folder is not None:
         write_json(folder / TRUTH_RECORD, {"with_truth": True})
-    return StudyWindows(cut, keys, folds, paths, with_truth)
+    before = {steps for way in plan.methods for name in way.foundations for steps in steps_before(plan, name)}
+    return StudyWindows(cut, keys, folds, paths, with_truth, sorted(before) if every else ())
+
+
+def _find_plan(place: Path, folder: Path | None, trust: bool) -> Plan:
+    return read_plan(place, trust=trust) if folder is None else store.stored_plan(folder, trust)
 
 
 def hide_future(cut: Windows, known: bool, with_truth: bool) -> Windows:
@@ -162,21 +197,3 @@ def hide_future(cut: Windows, known: bool, with_truth: bool) -> Windows:
     shown = 1.0 if with_truth else np.nan
     states = {name: shown * values for name, values in cut.states.items()}
     return replace(cut, planned=planned, future=np.ascontiguousarray(shown * cut.future), states=states)
-
-
-def prediction_table(cut: Windows, paths: Array, **columns: Array) -> pd.DataFrame:
-    """Paths (T, S, 2) [m] in the frame (11) as a table: run, instant, ahead [s], north, east [m], x, y [m].
-
-    columns : further ones, (T, S). `shipid study score` takes such a table of the test windows.
-    """
-    now, (x, y) = cut.columns, np.moveaxis(paths, -1, 0)
-    north, east = from_frame(x, y, now["north"], now["east"], now["psi"])
-    steps = cut.step * np.arange(1, cut.horizon + 1)
-    return _long_table(cut, steps, {"north": north, "east": east, "x": x, "y": y, **columns})
-
-
-def _long_table(cut: Windows, ahead: Array, columns: Mapping[str, Array]) -> pd.DataFrame:
-    """A row for each window and time ahead (K,) [s], window by window; columns (K, S) by name."""
-    keys: dict[str, Any] = {"run": np.repeat(cut.run, len(ahead)), "instant": np.repeat(cut.t, len(ahead))}
-    keys["ahead"] = np.tile(ahead, len(cut))
-    return pd.DataFrame(keys | {name: np.asarray(values).T.ravel() for name, values in columns.items()})

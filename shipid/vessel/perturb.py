@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol, Self, runtime_checkable
 
 import tomlkit
 from pydantic import (
@@ -42,6 +42,26 @@ _BETWEEN = "\x1f"  # of the parts of a key
 _RELATIONS = {">=": operator.ge, "<=": operator.le, "==": operator.eq, ">": operator.gt, "<": operator.lt}
 
 
+@runtime_checkable
+class PerturbedBase(Protocol):
+    """What a family changes: a vessel, or a simulator of somebody else."""
+
+    @property
+    def key(self) -> str:
+        """Name."""
+
+    @property
+    def digest(self) -> str:
+        """Digest of all that its paths depend on."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Dotted path -> number."""
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """Return the base with other numbers."""
+
+
 @dataclass(frozen=True)
 class PerturbationRule:
     """One way of changing numbers, named by its key in a `[[family.perturb]]` block.
@@ -57,14 +77,14 @@ class PerturbationRule:
     argument: Any
     change: Callable[[float, Any, float], float]
     drawn: Callable[[Any], bool] = lambda _: False
-    places: Callable[[Any, Vessel, Any, str], Mapping[str, Any]] | None = None
+    places: Callable[[Any, PerturbedBase, Any, str], Mapping[str, Any]] | None = None
     note: str = ""
 
 
 WITHOUT = 'a rule changes numbers; a whole term goes by structure = {"wind.off" = true} of the family'
 
 
-def _checked_values(values: Mapping[str, float], base: Vessel, file: Any, where: str) -> Mapping[str, float]:
+def _checked_values(values: Mapping[str, float], base: PerturbedBase, file: Any, where: str) -> Mapping[str, float]:
     unknown = next((path for path in values if path not in base.parameters), None)
     if unknown is not None:
         switch = unknown.rpartition(".")[2] in ("off", "kind")
@@ -182,6 +202,12 @@ class Family(CheckedModel, BaseModel):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,79}$")]
     base: str | None = None
+    predictions: Annotated[list[str], Field(min_length=1)] | str | None = Field(
+        default=None, description="tables of paths in place of a base, a member each"
+    )
+    function: str | None = Field(
+        default=None, description='a function of Python in place of a base, such as "my_ship:simulate"'
+    )
     extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
     members: Annotated[int, Field(ge=1, le=100000)] = 1
     seed: int = 0
@@ -276,6 +302,10 @@ def patch_text(
     return tomlkit.dumps(patch)
 
 
+SOURCES = ("base", "predictions", "function")
+"""Keys of a family, one of which says where its paths come from."""
+
+
 def resolve_families(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:
     """Families with `extends` written out; unknown or circular ones, and missing bases, raise DocumentError."""
     by_name: dict[str, Family] = {}
@@ -294,8 +324,12 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
                 hint = suggest_name(family.extends, by_name)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
             parent = written_out(by_name[family.extends], (*above, family.name))
+        own = {key: value for key in SOURCES if (value := getattr(family, key)) is not None}
+        if len(own) > 1:
+            fault = f"stands beside {next(iter(own))!r}: give one of {', '.join(SOURCES)}"
+            raise DocumentError(fault, file=file, path=f"{where}.{[*own][1]}")
         changes = {
-            "base": family.base or parent.base,
+            **{key: getattr(family if own else parent, key) for key in SOURCES},
             "extends": None,
             "structure": parent.structure | family.structure,
             "perturb": [*parent.perturb, *family.perturb],
@@ -306,7 +340,7 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         }
         resolved = family.model_copy(update=changes)
         resolved._inherited = len(parent.perturb)
-        if resolved.base is None:
+        if all(getattr(resolved, key) is None for key in SOURCES):
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
         drawn = any(block.drawn for block in resolved.perturb)
         if resolved.members > 1 and not (resolved.equal or resolved.identify or resolved.observer or drawn):
@@ -321,7 +355,7 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
 
 
 def draw_variant(
-    family: Family, member: int, base: Vessel, counter: int = 0, file: str | Path | None = None
+    family: Family, member: int, base: PerturbedBase, counter: int = 0, file: str | Path | None = None
 ) -> Variant:
     """Draw one member of a resolved family, redrawn so often; see `draw_members`."""
     return draw_members(family, base, file, [member], counter)[0]
@@ -343,7 +377,7 @@ Step = tuple[str, Callable[[float, Any, float], float], Any, str | None]
 
 def draw_members(
     family: Family,
-    base: Vessel,
+    base: PerturbedBase,
     file: str | Path | None = None,
     numbers: Iterable[int] | None = None,
     counter: int = 0,
@@ -383,10 +417,10 @@ def draw_members(
     return result
 
 
-def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[Step]:
+def _draw_steps(family: Family, base: PerturbedBase, file: str | Path | None) -> list[Step]:
     """What a member changes, in order; DocumentError for a path that the base does not have."""
     check_class("family", family, Family, "such as Family(name=..., perturb=[...])")
-    check_class("base", base, Vessel, "as of `load_vessel`")
+    check_class("base", base, PerturbedBase, "as of `load_vessel`")
     if family.extends is not None:
         raise DocumentError(
             f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve_families`",

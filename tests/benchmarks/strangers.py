@@ -27,10 +27,11 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
+from shipid.data.windows import constant_motion
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import constant_motion, obtain_runs, partition, path_source, window_memory
+from shipid.study.prepare import obtain_runs, partition, path_source, window_memory
 from shipid.study.results import read_results
 from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw

@@ -16,7 +16,7 @@ import tomlkit
 
 from shipid.answer.sentences import answer_sentences
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows, cut_windows, from_frame
+from shipid.data.windows import Windows, constant_motion, cut_windows, from_frame
 from shipid.errors import DataError, DivergenceError, DocumentError, ResultError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.learned_force import ForceCorrector
@@ -31,7 +31,6 @@ from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import (
     PreparedStudy,
     all_windows,
-    constant_motion,
     estimates_of,
     instants_of,
     kinds_of_runs,

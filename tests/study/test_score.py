@@ -14,9 +14,10 @@ import pytest
 import shipid
 from shipid.data.windows import Windows, from_frame
 from shipid.errors import DataError
+from shipid.foundations.predictions import prediction_table
 from shipid.study.results import Results, read_results
 from shipid.study.score import read_predictions
-from shipid.study.windows import prediction_table, windows
+from shipid.study.windows import windows
 from tests.cli.running import output_of
 from tests.hybrid.quick import QUICK
 from tests.study.tiny import run_here, tiny_plan, without_figures

@@ -1,0 +1,175 @@
+"""A simulator that is a function of Python: states at instants, orders and weather ahead -> states ahead."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, Self, cast
+
+import numpy as np
+
+from shipid.arguments import as_float_array
+from shipid.data.windows import Instants
+from shipid.errors import DataError, DocumentError, suggest_name
+from shipid.hybrid.physics import Needs
+from shipid.hybrid.simulated import Array, NamedSimulator
+from shipid.physics.signals import measurable_signals
+from shipid.users import locate_errors, users_code
+
+SimulateFunction = Callable[..., Any]
+FUNCTIONS: dict[str, SimulateFunction] = {}
+"""Name, as after `function = ` in a document -> function, put here from Python: it needs no trust."""
+STATES = ("north", "east", "psi", "u", "v", "r")
+ARGUMENTS = ("states", "orders", "weather", "step")
+BATCH = 1000  # instants of a call: 300 steps of 20 columns are 48 MB
+
+
+@dataclass(frozen=True)
+class SimulatorFunction(NamedSimulator):
+    """A function `simulate(states, orders, weather, step, **parameters)` -> states (S, K, 6) after 1..K steps.
+
+    states : (S, 6), north, east [m], psi [rad], u, v [m/s], r [rad/s]. orders, weather : name -> (S, K) in SI units,
+    in force from step k-1 to k. step : [s]. A state that is no number means that it diverged there.
+
+    key : `module:function` or a name in `FUNCTIONS`. file : of the module; empty where Python finds it.
+    parameters : keyword numbers and their values.
+    """
+
+    key: str
+    digest: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    file: str = ""
+    trust: bool = field(default=False, compare=False)
+    given: SimulateFunction | None = field(default=None, repr=False)
+    gives: tuple[Needs, ...] = ("path", "motion", "steps")
+
+    kind: ClassVar[str] = "function"
+
+    @classmethod
+    def read(cls, value: Any, folder: Path, trust: bool) -> Sequence[Self]:
+        """Return the function that a document in a folder names; DocumentError where it may or can not be used."""
+        module = value.partition(":")[0]
+        beside = [place / f"{module}.py" for place in (folder, Path())]
+        file = next((str(place.absolute()) for place in beside if place.is_file()), "")
+        one = cls(value, file=file, trust=trust, given=FUNCTIONS.get(value))
+        return [replace(one, digest=users_code((one.function,)), parameters=keyword_numbers(one.function, value))]
+
+    @classmethod
+    def from_header(cls, header: Mapping[str, Any], folder: Path, trust: bool) -> Self:  # noqa: ARG003
+        """Return the function of a stored study; its code is not needed until it is called."""
+        known = {name: header[name] for name in ("key", "digest", "parameters", "file")}
+        return cls(**known, trust=trust, given=FUNCTIONS.get(header["key"]))
+
+    def header(self) -> dict[str, Any]:
+        """Return its name, the digest of its code, its parameters and its file."""
+        named = {name: getattr(self, name) for name in ("kind", "key", "digest", "file")}
+        return {**named, "parameters": dict(self.parameters)}
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Return the function with other parameters."""
+        super().with_values({name: value for name, value in values.items() if name not in self.parameters})
+        return replace(self, parameters={**self.parameters, **values})
+
+    @cached_property
+    def function(self) -> SimulateFunction:
+        """The function itself; DocumentError where it may not be run, or is not there."""
+        if self.given is not None:
+            return self.given
+        if ":" not in self.key:
+            hint = suggest_name(self.key, FUNCTIONS)
+            raise DocumentError(
+                f"{self.key!r}: write 'module:function', or a name that Python put into FUNCTIONS: {hint}"
+            )
+        if not self.trust:
+            words = f"{self.key} is code that this document names: read it"
+            raise DocumentError(f"{words}, and add --trust to run it (in Python: `read_plan(..., trust=True)`)")
+        module, _, name = self.key.partition(":")
+        held = import_users_module(module, self.file)
+        found = getattr(held, name, None)
+        if not callable(found):
+            raise DocumentError(f"{self.key!r}: {module} has no function {name!r}: {suggest_name(name, vars(held))}")
+        return cast(SimulateFunction, found)
+
+    @property
+    def code_digest(self) -> str:
+        """Digest of its code as it is now; as it was when the study was read, where it may not be run."""
+        return users_code((self.function,)) if self.trust or self.given is not None else self.digest
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave a function of a file out: another process imports it anew."""
+        return {name: value for name, value in vars(self).items() if name != "function"}
+
+    def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
+        """Return the states that the function gives, name -> (T, S); it is called with `BATCH` instants at most."""
+        columns, count = instants.columns, len(instants)
+        zero = np.zeros(count)
+        begun = np.stack([np.asarray(columns.get(name, zero), float) for name in STATES], axis=-1)
+        held = {name: values for name, values in columns.items() if "." in name}
+        orders = {name: np.tile(values[:, None], horizon) for name, values in held.items()}
+        orders |= {name: np.asarray(values)[:horizon].T for name, values in (instants.planned or {}).items()}
+        weather = {name: np.tile(columns[name][:, None], horizon) for name in measurable_signals(columns)}
+        parts = []
+        for first in range(0, count, BATCH):
+            some = slice(first, first + BATCH)
+            tables = ({name: values[some] for name, values in table.items()} for table in (orders, weather))
+            with locate_errors(self.key, self.function, "function"):
+                given = self.function(begun[some], *tables, step, **self.parameters)
+            parts.append(as_float_array(f"states of {self.key}", given, DataError))
+            if parts[-1].shape != (wanted := (len(begun[some]), horizon, len(STATES))):
+                raise DataError(f"{self.key} must give states {wanted}, {', '.join(STATES)}, not {parts[-1].shape}")
+        every = np.concatenate(parts) if parts else np.empty((0, horizon, len(STATES)))
+        return {name: every[..., place].T for place, name in enumerate(STATES)}
+
+
+def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:
+    """Keyword parameters of a function and their numbers; DocumentError where it does not take what it is given."""
+    try:
+        every = list(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError):
+        every = []
+    numbers = {
+        one.name: float(one.default)
+        for one in every
+        if isinstance(one.default, int | float) and not isinstance(one.default, bool)
+    }
+    needed = [
+        one
+        for one in every
+        if one.default is one.empty and one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
+    ]
+    open_ended = any(one.kind is one.VAR_POSITIONAL for one in every)
+    required = [one.name for one in every if one.kind is one.KEYWORD_ONLY and one.default is one.empty]
+    if (len(needed) != len(ARGUMENTS) and not open_ended) or required:
+        words = f"{key} must take ({', '.join(ARGUMENTS)}), and numbers by keyword with a value, such as m=1.0"
+        raise DocumentError(f"{words}; it takes {inspect.signature(function) if every else 'nothing'}")
+    return numbers
+
+
+@cache
+def import_users_module(name: str, file: str) -> ModuleType:
+    """A module of a file, which may import its neighbours, or one that Python finds; DocumentError where it fails."""
+    folder = str(Path(file).parent) if file else ""
+    try:
+        if not file:
+            return importlib.import_module(name)
+        spec = importlib.util.spec_from_file_location(name, file)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.path.insert(0, folder)
+        try:
+            sys.modules.setdefault(name, module)  # not in place of another one, such as of another study
+            spec.loader.exec_module(module)
+        finally:
+            sys.path.remove(folder)
+        return module
+    except (Exception, SystemExit) as error:
+        where = f" in {file}" if file else ""
+        raise DocumentError(f"{name}{where} cannot be imported ({type(error).__name__}: {error})") from None
