@@ -10,7 +10,7 @@ import typer
 
 import shipid
 from shipid.cli.answer import Json, open_answer
-from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
+from shipid.cli.options import Changes, Trust, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, MOTION, MOTION_FORMATS
 from shipid.errors import DataError, DocumentError, ShipidError
@@ -34,11 +34,12 @@ def simulate_command(
         typer.Option(help="runs of a vessel: bundled study or TOML file with a [truth], or with [[manoeuvre]] blocks"),
     ] = None,
     changes: Changes = None,
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Simulate the truth of a study, or a vessel with manoeuvres drawn or given, into a log."""
     if manoeuvres is None:
-        _simulate_truth(name, out, changes, as_json)
+        _simulate_truth(name, out, changes, trust, as_json)
     elif changes:
         raise ShipidError("changes a study: write the document of manoeuvres as it is meant", path="--set")
     else:
@@ -63,13 +64,13 @@ def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> 
         answer.say_dataset(dataset, out)
 
 
-def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
+def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, trust: bool, as_json: bool) -> None:
     """The dataset of a study, and its envelope beside the published one."""
     from shipid.study.envelope import envelope_table, input_envelope
     from shipid.study.plan import input_files
     from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
-    plan = shipid.read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes), trust=trust)
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
     file = check_output(out or Path(f"{plan.name}.parquet"), input_files(plan), (".parquet",))

@@ -1,91 +1,37 @@
-"""A ship that is an FMU: a table says which variables are which signals, and FMPy runs it.
-
-The standard: Functional Mock-up Interface 1.0, 2.0 and 3.0 for co-simulation, fmi-standard.org.
-"""
+"""A simulator that is an FMU, which FMPy runs in a process of its own."""
 
 from __future__ import annotations
 
+import logging
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+import pandas as pd
 
-from shipid import document as documents
 from shipid.arguments import whole_steps
-from shipid.checked import CheckedModel, Positive
-from shipid.errors import DocumentError, ShipidError, suggest_name
+from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
+from shipid.data.windows import Instants, Windows
+from shipid.document import find_document
+from shipid.errors import DataError, DocumentError
+from shipid.foundations.faults import PLACES, doubt_of_places
 from shipid.foundations.fmu_process import FmuCall, FmuRun, run_fmu
-from shipid.logs.mapping import UNITS
-from shipid.physics.signals import ACTUAL, SIGNALS, is_command, signal_of
+from shipid.foundations.fmu_table import Fmu, read_fmu
+from shipid.foundations.function import STATES, SimulatorFunction
+from shipid.physics.signals import ACTUAL, SIGNALS, signal_of
 from shipid.units import DEGREE
 
+log = logging.getLogger(__name__)
+
 Array = np.ndarray
-STATES = ("north", "east", "psi", "u", "v", "r")
-Role = Literal["input", "output", "start", "parameter"]
-BEFORE = ("output", "local", "parameter", "input")  # what may be set before the start
-ROLES = {"input": ("input",), "output": ("output", "local"), "start": BEFORE, "parameter": BEFORE}
-"""Role of a row -> causalities of the variables that it may name."""
 RESPONSE = 120.0  # s of a step response
 SLOPE = 0.1  # by which the changes of place and heading may differ from the integrals of u, v and r, as a share
-
-
-class FmuRow(BaseModel):
-    """A row of `[fmu]`, `signal = { variable = ... }`: the signal is scale * variable + offset in `unit`."""
-
-    model_config = ConfigDict(extra="forbid")
-    variable: str
-    unit: str | None = Field(default=None, description="default: that of the variable, else that of the signal")
-    scale: Annotated[FiniteFloat, Field(description="not 0")] = 1.0
-    offset: FiniteFloat = 0.0
-    frame: Literal["ned", "enu", "body"] | None = Field(
-        default=None,
-        description="ned: angles from north to the right; enu: from east to the left; u, v in these or body axes",
-    )
-    role: Role | None = Field(default=None, description="default: by the causality of the variable")
-
-
-class FmuTable(CheckedModel, BaseModel):
-    """`[fmu]`: a file, its step, and a row, or a list of rows, for each signal."""
-
-    model_config = ConfigDict(extra="forbid")
-    file: str
-    step: Annotated[Positive | None, Field(description="s of communication; default: that of the prediction")] = None
-    limit: Annotated[Positive, Field(description="s that one run may take")] = 60.0
-    rows: dict[str, list[FmuRow]] = {}
-
-
-@dataclass(frozen=True)
-class Link:
-    """A signal and its variable: signal [SI] = factor * (scale * variable + offset), then turned by its frame."""
-
-    signal: str
-    reference: int
-    factor: float
-    row: FmuRow
-
-    @property
-    def over_ground(self) -> bool:
-        """Whether it is a speed along north or east, in place of u or v."""
-        return self.signal in ("u", "v") and self.row.frame in ("ned", "enu")
-
-    def to_signal(self, values: Array) -> Array:
-        """The signal [SI] of values of the variable."""
-        return self._turned(self.factor * (self.row.scale * values + self.row.offset))
-
-    def to_variable(self, values: Array) -> Array:
-        """Values of the variable of a signal [SI]."""
-        return np.asarray((self._turned(values) / self.factor - self.row.offset) / self.row.scale)
-
-    def _turned(self, values: Array) -> Array:
-        """An angle or a rate of turn to or from the axes east, north and up; the same both ways."""
-        if self.row.frame != "enu" or self.signal in ("north", "east", "u", "v"):
-            return values
-        return np.pi / 2 - values if SIGNALS[signal_of(self.signal)].angle else -values
+LOOKED_AT = 100  # training windows whose places are checked
 
 
 @dataclass(frozen=True)
@@ -102,33 +48,102 @@ class Along:
 
 
 @dataclass(frozen=True)
-class Fmu:
+class SimulatorFmu(SimulatorFunction):
     """An FMU with its table.
 
-    file : of the table, or of the FMU itself, whose variables are then signals by their names. path : of the FMU.
-    links : role -> rows, `parameter` with `start`. parameters : name -> value of each real parameter that is no signal.
-    references : name of a parameter -> its value reference. branches : whether it can go back to a state that it had.
+    key : as the document names it. file : of the table, or of the FMU itself, whose variables are then signals by their
+    names. parameters : of the FMU, in its own units. runs : records of the runs from their beginnings.
     """
 
-    file: Path
-    path: Path
-    table: FmuTable
-    links: Mapping[str, Sequence[Link]]
-    parameters: Mapping[str, float]
-    references: Mapping[str, int]
-    branches: bool
+    runs: Dataset | None = field(default=None, compare=False, repr=False)
+
+    kind: ClassVar[str] = "fmu"
+
+    @classmethod
+    def read(cls, value: Any, folder: Path, trust: bool) -> Sequence[Self]:
+        """Return the FMU that a document in a folder names; DocumentError where it may or can not be used."""
+        one = cls(value, file=str(find_document(Path(value), "models", folder).absolute()), trust=trust)
+        known = replace(one, digest=one.fmu.digest, parameters=one.fmu.parameters)
+        return [known if one.fmu.startable else replace(known, gives=("path", "motion"))]
+
+    @cached_property
+    def fmu(self) -> Fmu:
+        """What the FMU and its table say; DocumentError where it may not be run, or is none."""
+        self.require_trust()
+        return read_fmu(Path(self.file))
 
     @property
-    def startable(self) -> bool:
-        """Whether it can be started with given u and r; else it runs along a run from its beginning."""
-        return {"u", "r"} <= {link.signal for link in self.links["start"]}
+    def code_digest(self) -> str:
+        """Digest of the FMU and its table as they are now; as when the study was read, where it may not be run."""
+        return self.fmu.digest if self.trust else self.digest
+
+    def along(self, dataset: Dataset) -> Self:
+        """Return the FMU with the runs that it may have to go along."""
+        return replace(self, runs=dataset)
+
+    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:  # noqa: ARG002
+        """Say how it responds to its orders; DocumentError, DataError where signs, units or frames seem to be wrong."""
+        columns = training.columns
+        usual = {name: float(np.median(values)) for name, values in columns.items() if name == "u" or "." in name}
+        inputs = {name: usual.get(name, 0.0) for name in columns}
+        high = {name: float(np.quantile(columns[name], 0.95)) for name in usual if "." in name}
+        changes = {name: value - usual[name] for name, value in high.items() if value > usual[name]}
+        said = self.describe_response(np.array([0.0, 0.0, 0.0, usual["u"], 0.0, 0.0]), inputs, changes)
+        some = training.select(np.arange(0, len(training), max(len(training) // LOOKED_AT, 1)))
+        given = self.states(some.instants(known=True), some.horizon, some.step)
+        doubt = doubt_of_places(np.stack([given[name] for name in PLACES], axis=-1), some)
+        if doubt and remedy:
+            raise DataError(f"{doubt}; {remedy}", file=self.file)
+        way = "starts from the state of each window" if self.fmu.startable else "takes no u and r: runs along each run"
+        return [f"{self.key}: {words}" for words in (way, *said)]
+
+    def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
+        """Return the states that the FMU gives, name -> (T, S); no numbers from where it fails on."""
+        begun, orders, weather = self.arguments_of(instants, horizon)
+        motion, faults = self.simulate(begun, orders | weather, step, self._along(instants, step))
+        if faults:
+            log.warning("%s fails in %d of %d runs; the first: %s", self.key, len(faults), len(motion), faults[0])
+        return {name: motion[:, 1:, place].T for place, name in enumerate(STATES)}
+
+    def perform(self, frame: pd.DataFrame) -> pd.DataFrame:
+        """The runs of a log with the motion of the FMU by the same orders, from the same start; DataError if it fails.
+
+        frame : columns of a dataset, runs of equal length and equal steps. Motion other than in the plane is left out.
+        """
+        runs = [rows for _, rows in frame.groupby("run", sort=False)]
+        columns = {name: values.reshape(len(runs), -1) for name, values in _columns(frame).items()}
+        states = np.stack([columns[name][:, 0] for name in STATES], axis=-1)
+        along = [Along({name: columns[name][place] for name in columns}, [place], [0]) for place in range(len(runs))]
+        ahead = {name: values[:, :-1] for name, values in columns.items() if name not in STATES}
+        motion, faults = self.simulate(states, ahead, float(np.diff(columns["t"][0, :2])[0]), along)
+        if faults:
+            raise DataError(f"the FMU fails: {faults[0]}", file=self.file)
+        others = [name for name in frame if name in SIGNALS and SIGNALS[name].role == "motion" and name not in STATES]
+        moved = {name: motion[..., place].ravel() for place, name in enumerate(STATES)}
+        return frame.drop(columns=others).assign(**moved)
+
+    def _along(self, instants: Instants, step: float) -> list[Along]:
+        """The runs of instants from their beginnings, in steps of the FMU; none where nobody knows them."""
+        if self.runs is None or instants.run is None:
+            return []
+        along, within = [], step / self.steps_within(step)
+        for run, rows in stretches_of_runs(self.runs):
+            t, now = rows["t"].to_numpy(), instants.columns["t"]
+            slack = clock_slack(t)
+            mine = np.flatnonzero((instants.run == run) & (now >= t[0] - slack) & (now <= t[-1] + slack))
+            if len(mine):
+                mine = mine[np.argsort(now[mine], kind="stable")]
+                at = np.rint((now[mine] - t[0]) / within).astype(int)
+                held = np.searchsorted(t, t[0] + within * np.arange(max(at[-1], 1)) + slack, side="right") - 1
+                record = {name: values[held] for name, values in _columns(rows).items()}
+                along.append(Along(record, mine.tolist(), at.tolist()))
+        return along
 
     def simulate(
         self,
         states: Array,
         inputs: Mapping[str, Array],
         step: float,
-        parameters: Mapping[str, float],
         along: Sequence[Along] = (),
     ) -> tuple[Array, list[str]]:
         """Motion (S, K + 1, 6) after 0..K steps [s], no numbers from where it fails on, and the faults.
@@ -138,18 +153,17 @@ class Fmu:
         speeds are its own.
 
         states : (S, 6) north, east [m], psi [rad], u, v [m/s], r [rad/s]. inputs : orders and weather, name -> (S, K)
-            [SI]. parameters : of the FMU, in its own units; others keep the values that they have there. along : the
-            runs of the windows; without them actuators begin at their orders.
+            [SI]. along : the runs of the windows; without them actuators begin at their orders.
         """
         begun, every = dict(zip(STATES, np.asarray(states, float).T, strict=True)), self.steps_within(step)
         given = self._variables("input", {"psi": begun["psi"][:, None], **inputs}).repeat(every, axis=1).tolist()
-        names = {link.signal for link in self.links["start"]}
+        names = {link.signal for link in self.fmu.links["start"]}
         reached = {name for name in names if name.startswith(ACTUAL)}
-        if self.startable:
+        if self.fmu.startable:
             begun |= {name: values[:, 0] for name, values in inputs.items()}
             begun |= {name: begun[name.removeprefix(ACTUAL)].copy() for name in reached}
             tracks = [FmuRun(self._start_of(one), [], self._record_of(one)) for one in along if reached]
-            for one, values in zip(along, self._signals(tracks, step / every, 1, parameters)[0], strict=False):
+            for one, values in zip(along, self._signals(tracks, step / every, 1)[0], strict=False):
                 for name in reached:
                     begun[name][one.windows] = values[name][one.rows]
             order: Sequence[int] = range(len(given))
@@ -161,12 +175,12 @@ class Fmu:
                 record, last = self._record_of(one), None
                 for place, row in zip(one.windows, one.rows, strict=True):
                     start = self._start_of(one) if last is None else None
-                    runs.append(FmuRun(start, record[last or 0 : row], given[place], self.branches))
-                    last = row if self.branches else None
-        found, faults = self._signals(runs, step / every, every, parameters)
+                    runs.append(FmuRun(start, record[last or 0 : row], given[place], self.fmu.branches))
+                    last = row if self.fmu.branches else None
+        found, faults = self._signals(runs, step / every, every)
         motion = np.full((len(given), len(given[0]) // every + 1, len(STATES)), np.nan)
         motion[list(order)] = [np.stack([one[name] for name in STATES], axis=-1) for one in found]
-        turned = not (self.startable and "psi" in names)
+        turned = not (self.fmu.startable and "psi" in names)
         return _move_motion(motion, states, turned or not {"north", "east"} <= names, turned), faults
 
     def describe_response(self, state: Array, inputs: Mapping[str, float], changes: Mapping[str, float]) -> list[str]:
@@ -175,13 +189,13 @@ class Fmu:
         state : (6,) at the start. inputs, changes : name -> value, and how much more it is from the start on [SI].
         DocumentError where heading and place do not follow from r, u and v: a wrong sign, unit or frame.
         """
-        step, still = self.table.step or RESPONSE / 200, dict(zip(STATES, np.reshape(state, (6, 1)), strict=True))
+        step, still = self.fmu.table.step or RESPONSE / 200, dict(zip(STATES, np.reshape(state, (6, 1)), strict=True))
         held = [
-            {key: np.array([value + changes[key] * (key == one)]) for key, value in inputs.items()} for one in changes
+            {key: np.array([value + changes[one] * (key == one)]) for key, value in inputs.items()} for one in changes
         ]
         ahead = {key: np.stack([one[key] for one in held]).repeat(round(RESPONSE / step), axis=1) for key in inputs}
         along = [Along(still | one, [place], [0]) for place, one in enumerate(held)]
-        motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, {}, along)
+        motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, along)
         if not np.isfinite(motion).all():
             raise DocumentError(f"the FMU fails in a step response: {'; '.join(faults[:1])}", file=self.file)
         self._check_rates(motion, step)
@@ -210,9 +224,9 @@ class Fmu:
 
     def steps_within(self, step: float) -> int:
         """Steps of the FMU in one of the prediction."""
-        every = whole_steps(step, self.table.step or step)
+        every = whole_steps(step, self.fmu.table.step or step)
         if not every:
-            words = f"{self.table.step:g} s: the step of the prediction, {step:g} s, must be a multiple"
+            words = f"{self.fmu.table.step:g} s: the step of the prediction, {step:g} s, must be a multiple"
             raise DocumentError(words, file=self.file, path="fmu.step")
         return every
 
@@ -228,7 +242,7 @@ class Fmu:
 
     def _variables(self, role: str, signals: Mapping[str, Array]) -> Array:
         """Values (..., n) of the variables of a role; ShipidError where a signal is not there."""
-        links = self.links[role]
+        links = self.fmu.links[role]
         if missing := next((link.signal for link in links if link.signal not in signals), None):
             raise DocumentError(
                 f"the FMU takes {missing}, which the runs do not have", file=self.file, path=f"fmu.{missing}"
@@ -241,28 +255,24 @@ class Fmu:
         found = [link.to_variable(values[key]) for key, link in zip(keys, links, strict=True)]
         return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.empty((*np.shape(signals["psi"]), 0))
 
-    def _signals(
-        self, runs: Sequence[FmuRun], step: float, every: int, parameters: Mapping[str, float]
-    ) -> tuple[list[dict[str, Array]], list[str]]:
+    def _signals(self, runs: Sequence[FmuRun], step: float, every: int) -> tuple[list[dict[str, Array]], list[str]]:
         """Signals of each run [SI], name -> (K + 1,) in the axes of the FMU, from its branch on, and the faults."""
-        if unknown := next((name for name in parameters if name not in self.parameters), None):
-            words = f"no parameter of the FMU: {suggest_name(unknown, self.parameters)}"
-            raise DocumentError(words, file=self.file, path=unknown)
         start, inputs, outputs = (
-            [link.reference for link in self.links[role]] for role in ("start", "input", "output")
+            [link.reference for link in self.fmu.links[role]] for role in ("start", "input", "output")
         )
-        begun = [self.references[name] for name in parameters]
-        call = FmuCall(begun, list(map(float, parameters.values())), start, inputs, outputs, step, every)
-        found, faults = list[dict[str, Array]](), list[str]()
+        changed = {name: value for name, value in self.parameters.items() if value != self.fmu.parameters[name]}
+        before = [self.fmu.references[name] for name in changed]
+        call = FmuCall(before, [*changed.values()], start, inputs, outputs, step, every)
+        found, faults, links = list[dict[str, Array]](), list[str](), self.fmu.links["output"]
         with tempfile.TemporaryDirectory(prefix="shipid-fmu-") as folder:
-            with zipfile.ZipFile(self.path) as archive:
+            with zipfile.ZipFile(self.fmu.path) as archive:
                 archive.extractall(folder)
-            for run, (rows, fault) in zip(runs, run_fmu(Path(folder), call, runs, self.table.limit), strict=True):
+            for run, (rows, fault) in zip(runs, run_fmu(Path(folder), call, runs, self.fmu.table.limit), strict=True):
                 records = np.full((len(run.branch) // every + 1, len(outputs)), np.nan)
                 records[: len(rows)] = np.reshape(rows, (-1, len(outputs)))
-                values = {link.signal: link.to_signal(records[:, at]) for at, link in enumerate(self.links["output"])}
+                values = {link.signal: link.to_signal(records[:, at]) for at, link in enumerate(links)}
                 values["psi"] = np.unwrap(values["psi"])
-                frames = {link.row.frame for link in self.links["output"] if link.over_ground}
+                frames = {link.row.frame for link in links if link.over_ground}
                 if frames:
                     over = values["u"] + 1j * values["v"] if frames == {"ned"} else values["v"] + 1j * values["u"]
                     ahead = over * np.exp(-1j * values["psi"])
@@ -270,6 +280,11 @@ class Fmu:
                 found.append(values)
                 faults += [fault] if fault else []
         return found, faults
+
+
+def _columns(frame: pd.DataFrame) -> dict[str, Array]:
+    """Columns (N,) of numbers."""
+    return {str(name): frame[name].to_numpy() for name in frame if name not in ("run", "flags")}
 
 
 def _move_motion(motion: Array, states: Array, moved: bool, turned: bool) -> Array:
@@ -282,105 +297,3 @@ def _move_motion(motion: Array, states: Array, moved: bool, turned: bool) -> Arr
         motion[..., 0], motion[..., 1] = way.real, way.imag
     motion[..., 2] += turn
     return motion
-
-
-def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
-    """An FMU by its table, or by its own path where its variables have the names of signals.
-
-    DocumentError for a file that is no FMU for co-simulation, and for rows that are wrong or missing.
-    """
-    file = documents.find_document(Path(name), "models", relative_to)
-    raw = {"file": file.name} if file.suffix == ".fmu" else documents.read_document(file).get("fmu")
-    if not isinstance(raw, dict):
-        raise DocumentError("has no table [fmu]: give file, step, and a row for each signal", file=file)
-    own = {key: raw[key] for key in FmuTable.model_fields.keys() - {"rows"} if key in raw}
-    rows = {key: row if isinstance(row, list) else [row] for key, row in raw.items() if key not in own}
-    table: FmuTable = documents.parse_model(FmuTable, own | {"rows": rows}, file, "fmu")
-    path = documents.find_document(Path(table.file), "models", file.parent)
-    description = _read_description(path)
-    variables = {
-        one.name: one for one in description.modelVariables if one.type in ("Real", "Float64") and not one.dimensions
-    }
-    for one in variables.values():  # by its name, where no row says else
-        if one.name not in table.rows and _is_signal(one.name):
-            table.rows[one.name] = [FmuRow(variable=one.name)]
-    links: dict[str, list[Link]] = {role: [] for role in ROLES}
-    for signal, its in table.rows.items():
-        for row in its:
-            for role, link in _links_of_row(signal, row, variables, file):
-                links[role].append(link)
-    have = {link.signal for link in links["output"]}
-    missing = {"output": [name for name in STATES if name not in have], "input": [] if links["input"] else ["orders"]}
-    for role, names in missing.items():
-        if names:
-            there = ", ".join(one.name for one in variables.values() if one.causality in ROLES[role]) or "none"
-            words = f"no row gives {', '.join(names)}; variables of the FMU for a row of role {role}: {there}"
-            raise DocumentError(words, file=file, path="fmu")
-    used = {link.reference for some in links.values() for link in some}
-    free = {name: one for name, one in variables.items() if one.causality == "parameter" and one.start is not None}
-    free = {name: one for name, one in free.items() if one.valueReference not in used}
-    return Fmu(
-        file,
-        path,
-        table,
-        links | {"start": links["start"] + links["parameter"]},
-        {name: float(one.start) for name, one in free.items()},
-        {name: one.valueReference for name, one in free.items()},
-        description.fmiVersion[0] != "1" and description.coSimulation.canGetAndSetFMUstate,
-    )
-
-
-def _read_description(path: Path) -> Any:
-    """The model description of an FMU for co-simulation; DocumentError where it is none that runs here."""
-    try:
-        import fmpy
-    except ImportError:
-        raise ShipidError("FMPy runs an FMU: pip install 'shipid[fmu]'", file=path) from None
-    try:
-        description = fmpy.read_model_description(str(path), validate=False)
-        platforms = fmpy.supported_platforms(str(path))
-    except Exception as error:  # of the archive, of its XML or of what that says
-        raise DocumentError(f"is no FMU: {' '.join(str(error).split())[:200]}", file=path) from None
-    if description.coSimulation is None:
-        raise DocumentError("is an FMU for model exchange: export it for co-simulation", file=path)
-    if fmpy.platform not in platforms:
-        there = ", ".join(platforms) or "no platform"
-        raise DocumentError(f"has no binary for {fmpy.platform}, but for {there}: `fmpy compile` makes one", file=path)
-    return description
-
-
-def _is_signal(name: str) -> bool:
-    """Whether a name is that of a state, an order or the weather."""
-    return (
-        name in STATES
-        or is_command(name.removeprefix(ACTUAL))
-        or (name in SIGNALS and SIGNALS[name].role == "environment")
-    )
-
-
-def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: Path) -> Iterator[tuple[str, Link]]:
-    """Role and link of a row; of an output that may be set before the start, too, two."""
-    path = f"fmu.{signal}"
-    if not _is_signal(signal):
-        words = f"no signal: give {', '.join(STATES)}, an order such as rudder.delta, or wind such as V_w"
-        raise DocumentError(words, file=file, path=path)
-    if row.variable not in variables:
-        words = f"no real variable {row.variable!r}: {suggest_name(row.variable, variables)}"
-        raise DocumentError(words, file=file, path=f"{path}.variable")
-    variable = variables[row.variable]
-    roles = [role for role, kinds in ROLES.items() if variable.causality in kinds]
-    role: Any = row.role or next(iter(roles), None)
-    if role not in roles or role == ("input" if signal in STATES or signal.startswith(ACTUAL) else "output"):
-        words = f"{row.variable!r} has the causality {variable.causality}, no {role or 'variable'} of {signal}"
-        raise DocumentError(words, file=file, path=f"{path}.role")
-    si = SIGNALS[signal_of(signal)].unit
-    declared = variable.unit or getattr(variable.declaredType, "unit", None)
-    unit, known = row.unit or declared or si, UNITS.get(si, {si: 1.0})
-    if unit not in known or row.scale == 0:
-        words = f"{unit!r}: give one of {', '.join(known)}, and a scale that is not 0"
-        raise DocumentError(words, file=file, path=f"{path}.unit")
-    link = Link(signal, variable.valueReference, known[unit], row)
-    yield role, link
-    settable = variable.start is not None and variable.initial in ("exact", "approx", None)
-    if row.role is None and role == "output" and settable:
-        yield "start", link

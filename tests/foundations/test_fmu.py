@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.foundations.fmu import Along, read_fmu
+from shipid.foundations.fmu import Along, SimulatorFmu
 from tests.foundations.foreign import build_ship, motion_of_ship, write_table
 
 STEP, HORIZON, COUNT = 0.5, 20, 6
@@ -15,6 +15,10 @@ STEP, HORIZON, COUNT = 0.5, 20, 6
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("fmus")
+
+
+def as_fmu(table):
+    return SimulatorFmu.read(str(table), table.parent, True)[0]
 
 
 def drawn_windows(count=COUNT, seed=3):
@@ -33,10 +37,10 @@ def drawn_windows(count=COUNT, seed=3):
 @pytest.mark.parametrize("reset", [True, False])
 def test_another_ship_moves_as_in_numpy(folder, version, reset):
     """Knots, degrees, east and north, to port: each row turned back; an instance without reset is made anew."""
-    fmu = read_fmu(write_table(build_ship(folder / f"s{version}{reset}.fmu", version, reset=reset)))
+    fmu = as_fmu(write_table(build_ship(folder / f"s{version}{reset}.fmu", version, reset=reset)))
     states, orders = drawn_windows()
     for numbers in ({}, {"X_uu": 0.006, "K": 0.03}):
-        motion, faults = fmu.simulate(states, orders, STEP, numbers)
+        motion, faults = fmu.with_values(numbers).simulate(states, orders, STEP)
         assert faults == []
         np.testing.assert_allclose(motion[:, 1:], motion_of_ship(states, orders, STEP, **numbers), rtol=0, atol=1e-9)
 
@@ -58,13 +62,13 @@ def record_of_run(rows=60):
 @pytest.mark.parametrize(("version", "branches"), [(2, True), (2, False), (3, True)])
 def test_a_ship_without_start_values_runs_along_the_run(folder, version, branches):
     """From the beginning of the run to each instant, and on by what is known there; then moved to the true place."""
-    fmu = read_fmu(
+    fmu = as_fmu(
         write_table(
             build_ship(folder / f"along{version}{branches}.fmu", version, starts=False, branches=branches), False
         )
     )
-    assert not fmu.startable
-    assert fmu.branches == branches
+    assert not fmu.fmu.startable
+    assert fmu.fmu.branches == branches
     orders, motion = record_of_run()
     rows = [0, 5, 17, 30]
     held = {name: np.repeat(values[rows][:, None], HORIZON, axis=1) for name, values in orders.items()}
@@ -72,20 +76,20 @@ def test_a_ship_without_start_values_runs_along_the_run(folder, version, branche
     along = [Along({**orders, "psi": motion[:-1, 2]}, range(len(rows)), rows)]
     begun = motion[rows]
     for ahead in (held, known):
-        found, faults = fmu.simulate(begun, ahead, STEP, {}, along)
+        found, faults = fmu.simulate(begun, ahead, STEP, along)
         assert faults == []
         np.testing.assert_allclose(found[:, 1:], motion_of_ship(begun, ahead, STEP), rtol=0, atol=1e-9)
     turned = begun + np.array([100.0, -50.0, 0.7, 0, 0, 0])
-    found, _ = fmu.simulate(turned, known, STEP, {}, along)
+    found, _ = fmu.simulate(turned, known, STEP, along)
     np.testing.assert_allclose(found[:, 1:], motion_of_ship(turned, known, STEP), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("fault", "words"), [(1, "status 3"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")])
 def test_a_failing_ship_is_lost_from_there_on(folder, fault, words):
     """An error keeps what was before; the first window does not take the second one with it."""
-    fmu = read_fmu(write_table(build_ship(folder / "fails.fmu"), more="limit = 1"))
+    fmu = as_fmu(write_table(build_ship(folder / "fails.fmu"), more="limit = 1"))
     states, orders = drawn_windows(2)
-    motion, faults = fmu.simulate(states, orders, STEP, {"fault": fault})
+    motion, faults = fmu.with_values({"fault": fault}).simulate(states, orders, STEP)
     assert len(faults) == 2
     assert words in faults[1]
     kept = np.isfinite(motion).all(axis=-1).sum(axis=1).tolist()
@@ -95,9 +99,9 @@ def test_a_failing_ship_is_lost_from_there_on(folder, fault, words):
 
 
 def test_what_a_ship_prints_goes_nowhere(folder, capfd):
-    fmu = read_fmu(write_table(build_ship(folder / "prints.fmu")))
+    fmu = as_fmu(write_table(build_ship(folder / "prints.fmu")))
     states, orders = drawn_windows(2)
-    motion, faults = fmu.simulate(states, orders, STEP, {"fault": 4})
+    motion, faults = fmu.with_values({"fault": 4}).simulate(states, orders, STEP)
     assert faults == []
     np.testing.assert_allclose(motion[:, 1:], motion_of_ship(states, orders, STEP), rtol=0, atol=1e-9)
     assert capfd.readouterr() == ("", "")
@@ -120,7 +124,7 @@ def test_a_wrong_table_is_one_line(folder, old, new, words):
     assert old in table.read_text()
     table.write_text(table.read_text().replace(old, new))
     with pytest.raises(DocumentError) as error:
-        read_fmu(table)
+        as_fmu(table)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -129,7 +133,7 @@ RESPONSE = ({"rudder.delta": 0.0, "propeller.n": 2.5}, {"rudder.delta": 0.2, "pr
 
 
 def test_a_step_response_says_which_way_and_how_fast(folder):
-    fmu = read_fmu(write_table(build_ship(folder / "response.fmu")))
+    fmu = as_fmu(write_table(build_ship(folder / "response.fmu")))
     rudder, screw = fmu.describe_response(np.array([0, 0, 0, 5.0, 0, 0]), *RESPONSE)
     orders = {"rudder.delta": np.full((1, 200), 0.2), "propeller.n": np.full((1, 200), 2.5)}
     u, v, r = motion_of_ship(np.array([[0, 0, 0, 5.0, 0, 0]]), orders, 0.6)[0, -1, 3:]
@@ -153,5 +157,5 @@ def test_a_wrong_sign_unit_or_frame_shows_in_the_step_response(folder, old, new,
     assert old in table.read_text()
     table.write_text(table.read_text().replace(old, new))
     with pytest.raises(DocumentError) as error:
-        read_fmu(table).describe_response(np.array([0, 0, 0, 5.0, 0, 0]), *RESPONSE)
+        as_fmu(table).describe_response(np.array([0, 0, 0, 5.0, 0, 0]), *RESPONSE)
     assert where in str(error.value)
