@@ -142,7 +142,7 @@ class Predictor(DeployedMethod):
         return BandedPrediction(
             predicted,
             self.band(predicted, instants, level, pointwise=pointwise, kind=kind),
-            self.raise_alarm(instants),
+            self.raise_alarm(instants, None if paths is None or self.vessel else np.zeros(len(instants), bool)),
         )
 
     def band(

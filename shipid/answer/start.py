@@ -26,6 +26,7 @@ def run(
     *,
     scheduler: str | None = None,
     device: str = "cpu",
+    trust: bool = False,
 ) -> Results:
     """Run a study to its end, write its report, and return its results; what is finished already is not run again.
 
@@ -40,12 +41,13 @@ def run(
     workers : local processes of one thread each; default: one per core.
     scheduler : address of a Dask scheduler to use instead.
     device : PyTorch device: "cpu" or "cuda".
+    trust : whether code that the study names may run, such as that of a function.
 
     Raises ShipidError for whatever a user can mend.
     """
-    if read_plan(study, set).parts:
+    if read_plan(study, set, trust=trust).parts:
         raise ShipidError("has several parts: run it by `shipid.events`, read each folder in parts/", path=str(study))
-    for event in events(study, set, out, workers, scheduler=scheduler, device=device):
+    for event in events(study, set, out, workers, scheduler=scheduler, device=device, trust=trust):
         if line := event_line(event):
             log.info("%s", line)
         if event.kind == "end":
@@ -62,12 +64,13 @@ def events(
     *,
     scheduler: str | None = None,
     device: str = "cpu",
+    trust: bool = False,
 ) -> Iterator[Event]:
     """Run a study and yield what happens: notes, the start, every finished cell, the end, whose text is the folder.
 
     Arguments as of `run`. The report is not written: `write_pages(folder)` does.
     """
-    plan = read_plan(study, set)
+    plan = read_plan(study, set, trust=trust)
     folder = default_folder(plan) if out is None else as_path("out", out)
     yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
 

@@ -41,6 +41,8 @@ def write_predictor_function(model: ExportModel, name: str, file: Path) -> list[
         "limits": model.limits,
         "provenance": dict(model.predictor.provenance),
     }
+    if names.physics:
+        described["rows"]["physics"] = names.horizon
     if bands is not None:
         inputs |= {key: {key: "-"} for key in BAND_CHOICE}
         outputs |= {"band": dict(zip(BAND_ROWS, "mm--", strict=True)), "promised": {"promised": "-"}}

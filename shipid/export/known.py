@@ -30,6 +30,7 @@ class InputLayout:
     now : measured at the instant. reached : actuators that lag behind their orders. past : entries of each of
     `num_past` rows, the oldest first, 1 ... num_past steps before the instant; x, y are positions in the frame of the
     instant. planned : commands of each of `horizon` rows. estimates : of the observer.
+    physics : x, y of each of `horizon` rows of the path of the physics, where a simulator gives it.
     """
 
     now: tuple[str, ...]
@@ -40,6 +41,7 @@ class InputLayout:
     horizon: int
     estimates: tuple[str, ...]
     commands: tuple[str, ...]
+    physics: tuple[str, ...] = ()
 
     def before(self, steps: int) -> int:
         """Row of the past so many steps before the instant; IndexError where the past is shorter."""
@@ -50,7 +52,8 @@ class InputLayout:
     @property
     def sizes(self) -> dict[str, int]:
         """Entries of each input."""
-        return {
+        given = {"physics": self.horizon * len(self.physics)} if self.physics else {}
+        return given | {
             "now": len(self.now),
             "reached": len(self.reached),
             "past": self.num_past * len(self.past),
@@ -161,6 +164,8 @@ class PredictorInputs:
     @cached_property
     def path(self) -> MX:
         """Path (2, T) of the physics alone [m], see `shipid.hybrid.physics.hold_velocity`; zeros without physics."""
+        if self.names.physics:
+            return ca.reshape(self.inputs["physics"], 2, self.names.horizon)
         if self.physics.vessel is None:
             return MX(np.zeros((2, self.names.horizon)))
         way = self.records[:2, :]

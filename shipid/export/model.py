@@ -20,6 +20,7 @@ from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.method import widen_range
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
+from shipid.hybrid.simulated import SimulatedPhysics
 from shipid.observer import ESTIMATE_COLUMNS
 from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
@@ -114,8 +115,8 @@ class ExportModel:
 def build_model(predictor: DeployedMethod) -> ExportModel:
     """A predictor as a model.
 
-    Its inputs are those of the physics, and what the alarm and the band look at: every input of a method is among them,
-    but for the direction of the wind.
+    Its inputs are those of the physics, or the path of a simulator, and what the alarm and the band look at: every
+    input of a method is among them, but for the direction of the wind.
     """
     physics = predictor.physics_with_force
     states, memory, orders, weather = (tuple[str, ...](),) * 4
@@ -131,8 +132,12 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
     past = (*now[len(POSITION_ENTRIES) :], "x", "y") if predictor.past else ()
     estimates = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS) if physics.observer is not None else ()
     planned = commands if predictor.commands == "known" else ()
+    given = ("x", "y") if isinstance(physics, SimulatedPhysics) else ()
+    if given and (METHODS[predictor.method].needs != "path" or predictor.inputs.memory.error):
+        words = "the physics is a simulator, which no file holds, and the method asks it for more than a path"
+        raise ShipidError(f"{words}: take one that needs the path alone, without memory.error")
     return ExportModel(
         predictor,
         physics,
-        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, commands),
+        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, commands, given),
     )

@@ -10,7 +10,7 @@ from typing import get_args
 
 from shipid.arguments import as_path, check_choice, check_class
 from shipid.engine.integrate import Method
-from shipid.errors import DocumentError, suggest_name
+from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.export.c import SourceFiles, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
@@ -31,11 +31,13 @@ class ExportTarget:
 
     predictor : (model, name, file). vessel : (vessel, name, integrator, file); None where a vessel has nothing for it.
     ending : of the file; empty where the target is a folder.
+    takes_path : whether the path of the physics can be an input, where a simulator gives it.
     """
 
     predictor: Callable[[ExportModel, str, Path], list[Path]]
     vessel: Callable[[Vessel, str, Method, Path], list[Path]] | None = None
     ending: str = ""
+    takes_path: bool = False
 
 
 def export_predictor(
@@ -61,6 +63,9 @@ def export_predictor(
     if single and to != "onnx":
         raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
     model = build_model(predictor)
+    if model.layout.physics and not target.takes_path:
+        targets = " or ".join(name for name, one in EXPORT_TARGETS.items() if one.takes_path)
+        raise ShipidError(f"the physics is a simulator, which {to} cannot hold: {targets} writes the corrector alone")
     return [write_onnx(model, title, file, single=True)] if single else target.predictor(model, title, file)
 
 
@@ -111,7 +116,7 @@ EXPORT_TARGETS: dict[str, ExportTarget] = {
         lambda ship, title, rule, file: write_fmu(vessel_unit(ship, title, rule), file),
         ".fmu",
     ),
-    "casadi": ExportTarget(write_predictor_function, write_vessel_function, ".casadi"),
-    "onnx": ExportTarget(lambda model, title, file: [write_onnx(model, title, file)], None, ".onnx"),
+    "casadi": ExportTarget(write_predictor_function, write_vessel_function, ".casadi", True),
+    "onnx": ExportTarget(lambda model, title, file: [write_onnx(model, title, file)], None, ".onnx", True),
 }
 """Name of a target, as after `--to`, -> how it is written."""

@@ -89,7 +89,7 @@ class PredictionTable(NamedSimulator):
     def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:
         """Refuse a table whose rows are not those of the study, and, with a remedy, one that seems to be wrong."""
         file, wanted = Path(self.file), study_keys((training, test), before)
-        check_keys(self.frame, wanted, file, "study")
+        check_keys(self.frame, wanted, file, " --every")
         given = self.states(training.instants(), training.horizon, training.step)
         doubt = doubt_of_places(np.stack([given[name] for name in PLACES], axis=-1), training)
         if doubt and remedy:
@@ -140,14 +140,14 @@ def study_keys(parts: Sequence[Windows], before: Collection[int]) -> pd.MultiInd
     return keys.drop_duplicates()
 
 
-def check_keys(frame: pd.DataFrame, wanted: pd.MultiIndex, file: Path, what: str) -> None:
-    """DataError where steps are missing, there twice, or none of what is wanted: `test` or `study`."""
+def check_keys(frame: pd.DataFrame, wanted: pd.MultiIndex, file: Path, option: str = "") -> None:
+    """DataError where steps are there twice or missing, or, without an option of `study windows`, not wanted."""
     given: Any = frame.index
-    listing = "`shipid study windows` lists it" if what == "test" else "`shipid study windows --every` lists it"
+    listing = f"`shipid study windows{option}` lists them"
     for rows, fault in (
-        (given[~given.isin(wanted)], f"are none of the {what}: {listing}"),
+        (given[:0] if option else given[~given.isin(wanted)], f"are none of the test: {listing}"),
         (given[given.duplicated()], "are there twice: give each once"),
-        (wanted.difference(given), f"are missing{'' if what == 'test' else f': {listing}'}"),
+        (wanted.difference(given), f"are missing: {listing}"),
     ):
         for run, instant, ahead in rows[:1]:
             where = f"run {run!r}, instant {instant:g} s, ahead {ahead:g} s"
@@ -165,7 +165,7 @@ def ordered_values(frame: pd.DataFrame, keys: pd.MultiIndex, names: Sequence[str
 def ordered_places(frame: pd.DataFrame, test: Windows, file: Path) -> Array:
     """North and east (T, S, 2) [m] in the order of the windows; DataError for a fault of the rows."""
     wanted, given = study_keys([test], ()), index_predictions(frame)
-    check_keys(given, wanted, file, "test")
+    check_keys(given, wanted, file)
     return ordered_values(given, wanted, PLACES, file).reshape(len(test), test.horizon, 2).swapaxes(0, 1)
 
 

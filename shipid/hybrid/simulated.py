@@ -25,11 +25,13 @@ Array = np.ndarray
 class Simulator(ABC):
     """What a `SimulatedPhysics` asks for paths.
 
-    key : its name in a document. digest : of all that its paths depend on. parameters : numbers that families change.
+    key : its name in a document. file : of its code or paths; may be empty. digest : of all that its paths depend on.
+    parameters : numbers that families change.
     gives : what a method may ask of it, see `Needs`.
     """
 
     key: str
+    file: str
     digest: str
     parameters: Mapping[str, float]
     gives: tuple[Needs, ...]
@@ -135,6 +137,7 @@ class SimulatorRecord(Simulator):
     """What a saved predictor knows of its simulator: neither its code nor its paths."""
 
     known: Mapping[str, Any]
+    file: str = ""
     digest: str = ""
     gives: tuple[Needs, ...] = ("path",)
     parameters: Mapping[str, float] = field(default_factory=dict)

@@ -203,10 +203,11 @@ def vessels_of(plan: Plan) -> list[Vessel]:
 
 
 def input_files(plan: Plan) -> list[Path]:
-    """Files that the study is read from: the document, the vessels, the mapping, the log and the dataset."""
+    """Files that the study is read from: the document, vessels, simulators, the mapping, the log and the dataset."""
     data, here = plan.study.data, Path(plan.file)
     named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
-    vessels = [Path(vessel.file) for vessel in plan.vessels.values()]
+    vessels = [Path(one.file) for one in plan.vessels.values()]
+    vessels += [Path(one.file) for one in plan.simulators.values() if one.file]
     of_parts = (name for part in plan.parts.values() for name in input_files(part.plan))
     mine = (path_from_study(here.parent, name) for name in named if name is not None)
     return list(dict.fromkeys([here, *vessels, *mine, *of_parts]))

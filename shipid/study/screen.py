@@ -37,8 +37,8 @@ ROW_COLUMNS = ("family", "member", "A", "A_90", "diverged")
 
 
 def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
-    """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
-    drawn = [family for family in plan.families if any(block.drawn for block in family.perturb)]
+    """The named family of vessels, or all that draw factors from a range; DocumentError if nothing is drawn."""
+    drawn = [one for one in plan.families if one.base is not None and any(block.drawn for block in one.perturb)]
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
         which = "no family draws a" if name is None else f"{name!r} draws no"
