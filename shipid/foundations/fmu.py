@@ -124,11 +124,11 @@ class SimulatorFmu(SimulatorFunction):
 
     def _along(self, instants: Instants, step: float) -> list[Along]:
         """The runs of instants from their beginnings, in steps of the FMU; none where nobody knows them."""
-        if self.runs is None or instants.run is None:
+        if self.runs is None or instants.run is None or instants.t is None:
             return []
         along, within = [], step / self.steps_within(step)
         for run, rows in stretches_of_runs(self.runs):
-            t, now = rows["t"].to_numpy(), instants.columns["t"]
+            t, now = rows["t"].to_numpy(), instants.t
             slack = clock_slack(t)
             mine = np.flatnonzero((instants.run == run) & (now >= t[0] - slack) & (now <= t[-1] + slack))
             if len(mine):
