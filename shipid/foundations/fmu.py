@@ -18,9 +18,9 @@ from shipid.arguments import whole_steps
 from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
 from shipid.data.windows import Instants, Windows
 from shipid.document import find_document
+from shipid.engine.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.errors import DataError, DocumentError
 from shipid.foundations.faults import PLACES, doubt_of_places
-from shipid.foundations.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.foundations.fmu_table import Fmu, read_fmu
 from shipid.foundations.function import STATES, SimulatorFunction
 from shipid.physics.signals import ACTUAL, SIGNALS, signal_of

@@ -123,7 +123,7 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
         one.name: one for one in description.modelVariables if one.type in ("Real", "Float64") and not one.dimensions
     }
     for one in variables.values():  # by its name, where no row says else
-        if one.name not in table.rows and _is_signal(one.name):
+        if one.causality in ("input", "output") and _is_signal(one.name) and one.name not in table.rows:
             table.rows[one.name] = [FmuRow(variable=one.name)]
     links: dict[str, list[Link]] = {role: [] for role in ROLES}
     for signal, its in table.rows.items():

@@ -62,7 +62,7 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     while left and ends < MOST_ENDS:
         (here, there), allowed = Pipe(), TO_LOAD + limit
-        command = [sys.executable, "-P", "-m", "shipid.foundations.fmu_process", str(there.fileno()), str(folder)]
+        command = [sys.executable, "-P", "-m", "shipid.engine.fmu_process", str(there.fileno()), str(folder)]
         with tempfile.TemporaryFile() as log, here:
             given: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
             process = subprocess.Popen(command, pass_fds=[there.fileno()], cwd=folder, **given)
