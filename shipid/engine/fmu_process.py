@@ -61,7 +61,7 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
     left, ends, fault = list(runs), 0, ""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     while left and ends < MOST_ENDS:
-        (here, there), allowed = Pipe(), TO_LOAD + limit
+        (here, there), allowed = Pipe(), TO_LOAD
         command = [sys.executable, "-P", "-m", "shipid.engine.fmu_process", str(there.fileno()), str(folder)]
         with tempfile.TemporaryFile() as log, here:
             given: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
@@ -70,11 +70,13 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
             try:
                 here.send((call, left))
                 while left and here.poll(allowed):
-                    (rows, fault), allowed = here.recv(), limit
-                    yield rows, fault + _last_line(log) * bool(fault)
+                    rows, fault = here.recv()
+                    if rows is not None:  # else it is loaded now
+                        yield rows, fault + _last_line(log) * bool(fault)
+                        del left[0]
+                    allowed = limit
                     os.ftruncate(log.fileno(), 0)
-                    del left[0]
-                fault = f"takes longer than {limit:g} s"
+                fault = f"takes longer than {allowed:g} s"
             except (EOFError, OSError):
                 fault = "ends its process"
             finally:
@@ -158,9 +160,10 @@ class FmuInstance:
 
 
 def _serve(connection: Connection, folder: str) -> None:
-    """Answer one request with the records and the fault of each run."""
+    """Answer one request: nothing once the FMU is loaded, then the records and the fault of each run."""
     call, runs = connection.recv()
     one, fault = FmuInstance(folder, call), ""
+    connection.send((None, ""))
     for run in runs:
         rows: Rows = []
         try:

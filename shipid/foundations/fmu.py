@@ -16,11 +16,10 @@ import pandas as pd
 
 from shipid.arguments import whole_steps
 from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
-from shipid.data.windows import Instants, Windows
+from shipid.data.windows import Instants, Windows, from_frame
 from shipid.document import find_document
 from shipid.engine.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.errors import DataError, DocumentError
-from shipid.foundations.faults import PLACES, doubt_of_places
 from shipid.foundations.fmu_table import Fmu, read_fmu
 from shipid.foundations.function import STATES, SimulatorFunction
 from shipid.physics.signals import ACTUAL, SIGNALS, signal_of
@@ -31,7 +30,8 @@ log = logging.getLogger(__name__)
 Array = np.ndarray
 RESPONSE = 120.0  # s of a step response
 SLOPE = 0.1  # by which the changes of place and heading may differ from the integrals of u, v and r, as a share
-LOOKED_AT = 100  # training windows whose places are checked
+LOOKED_AT = 100  # training windows on which the signs of orders are tried
+OTHER_WAY = 0.5  # times the error at the horizon as it is: an order with another sign that leaves less has it
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,18 @@ class SimulatorFmu(SimulatorFunction):
         changes = {name: value - usual[name] for name, value in high.items() if value > usual[name]}
         said = self.describe_response(np.array([0.0, 0.0, 0.0, usual["u"], 0.0, 0.0]), inputs, changes)
         some = training.select(np.arange(0, len(training), max(len(training) // LOOKED_AT, 1)))
-        given = self.states(some.instants(known=True), some.horizon, some.step)
-        doubt = doubt_of_places(np.stack([given[name] for name in PLACES], axis=-1), some)
-        if doubt and remedy:
-            raise DataError(f"{doubt}; {remedy}", file=self.file)
+        given, own = some.instants(known=True), [link.signal for link in self.fmu.links["input"] if link.signal in high]
+        begun, orders, weather = self.arguments_of(given, some.horizon)
+        goal = np.stack(from_frame(*some.future[-1].T, *begun[:, :3].T), axis=-1)
+        errors = dict[str, float]()
+        for name in ("", *own):  # as it is, and with each order the other way
+            turned = {key: -values if key == name else values for key, values in orders.items()}
+            motion, _ = self.simulate(begun, turned | weather, some.step, self._along(given, some.step))
+            errors[name] = float(np.hypot(*(motion[:, -1, :2] - goal).T).mean())
+        least = min(errors, key=errors.__getitem__)
+        if remedy and errors[least] < OTHER_WAY * errors[""]:
+            words = f"{least} acts the other way in the runs: check sign (scale) and frame of its row"
+            raise DataError(f"{words}; {remedy}", file=self.file, path=f"fmu.{least}")
         way = "starts from the state of each window" if self.fmu.startable else "takes no u and r: runs along each run"
         return [f"{self.key}: {words}" for words in (way, *said)]
 
