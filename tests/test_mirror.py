@@ -15,6 +15,9 @@ ELSEWHERE = {
     "physics/__init__.py": "test_laws.py",
     "measures/__init__.py": "measures/test_laws.py",
     "report/__init__.py": "report/test_page.py",
+    "foundations/__init__.py": "foundations/test_foundations.py",
+    "foundations/faults.py": "study/test_score.py",
+    "hybrid/simulated.py": "foundations/test_foundations.py",
     "study/apply.py": "study/test_whole.py",
     "study/cells.py": "study/test_run.py",
     # the parts of one graph: what is written from them equals Python, for every method
