@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -159,3 +162,14 @@ def test_a_wrong_sign_unit_or_frame_shows_in_the_step_response(folder, old, new,
     with pytest.raises(DocumentError) as error:
         as_fmu(table).describe_response(np.array([0, 0, 0, 5.0, 0, 0]), *RESPONSE)
     assert where in str(error.value)
+
+
+def test_the_table_of_the_page_is_that_of_the_ship(folder):
+    page = (Path(__file__).parents[2] / "docs" / "own-simulator.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^```toml\n(# ship.toml\n.*?)^```", page, re.MULTILINE | re.DOTALL)
+    build_ship(folder / "ship.fmu", 3)
+    (folder / "ship.toml").write_text(table)
+    states, orders = drawn_windows()
+    motion, faults = as_fmu(folder / "ship.toml").simulate(states, orders, STEP)
+    assert faults == []
+    np.testing.assert_allclose(motion[:, 1:], motion_of_ship(states, orders, STEP), rtol=0, atol=1e-9)
