@@ -106,6 +106,7 @@ def study_screen(
     ] = False,
     changes: Changes = None,
     device: Device = "cpu",
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
@@ -116,7 +117,7 @@ def study_screen(
 
     engine = "single" if single else REPEATED
     check_device(device)
-    plan = shipid.read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes), trust=trust)
     file = check_output(out or Path(f"{plan.name}-screen.csv"), input_files(plan), TABLES)
     wanted, dataset = screen.drawn_families(plan, family), obtain_runs(plan)
     cut = partition(plan, dataset)

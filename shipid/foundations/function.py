@@ -83,14 +83,11 @@ class SimulatorFunction(NamedSimulator):
         if self.given is not None:
             return self.given
         if ":" not in self.key:
-            hint = suggest_name(self.key, FUNCTIONS)
-            raise DocumentError(
-                f"{self.key!r}: write 'module:function', or a name that Python put into FUNCTIONS: {hint}"
-            )
+            words = f"{self.key!r}: write 'module:function', or a name that Python put into FUNCTIONS"
+            raise DocumentError(f"{words}: {suggest_name(self.key, FUNCTIONS)}")
         self.require_trust()
         module, _, name = self.key.partition(":")
-        held = import_users_module(module, self.file)
-        found = getattr(held, name, None)
+        found = getattr(held := import_users_module(module, self.file), name, None)
         if not callable(found):
             raise DocumentError(f"{self.key!r}: {module} has no function {name!r}: {suggest_name(name, vars(held))}")
         return cast(SimulateFunction, found)
@@ -138,25 +135,17 @@ class SimulatorFunction(NamedSimulator):
 def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:
     """Keyword parameters of a function and their numbers; DocumentError where it does not take what it is given."""
     try:
-        every = list(inspect.signature(function).parameters.values())
-    except (TypeError, ValueError):
-        every = []
-    numbers = {
-        one.name: float(one.default)
-        for one in every
-        if isinstance(one.default, int | float) and not isinstance(one.default, bool)
-    }
-    needed = [
-        one
-        for one in every
-        if one.default is one.empty and one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
-    ]
-    open_ended = any(one.kind is one.VAR_POSITIONAL for one in every)
-    required = [one.name for one in every if one.kind is one.KEYWORD_ONLY and one.default is one.empty]
-    if (len(needed) != len(ARGUMENTS) and not open_ended) or required:
+        taken = inspect.signature(function)
+        given = taken.bind(*ARGUMENTS).arguments
+    except (TypeError, ValueError) as error:
         words = f"{key} must take ({', '.join(ARGUMENTS)}), and numbers by keyword with a value, such as m=1.0"
-        raise DocumentError(f"{words}; it takes {inspect.signature(function) if every else 'nothing'}")
-    return numbers
+        raise DocumentError(f"{words}: {error}") from None
+    values = {name: one.default for name, one in taken.parameters.items() if name not in given}
+    return {
+        name: float(value)
+        for name, value in values.items()
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    }
 
 
 @cache

@@ -108,7 +108,10 @@ class SimulatedPhysics(Physics):
     ) -> tuple[Array, Array]:
         """Paths (T, 1, S, 2) [m] in the frame (11), and which diverged (1, S): no number, or faster than any ship."""
         states = self.states(instants)
-        paths, begun = np.stack([states["x"], states["y"]], axis=-1), self.step * _velocity(instants)
+        paths = np.stack([states["x"], states["y"]], axis=-1)
+        begun = self.step * np.stack(
+            [instants.columns.get(name, np.zeros(len(instants))) for name in ("u", "v")], axis=-1
+        )
         with np.errstate(all="ignore"):
             steps = np.diff(np.concatenate([np.zeros_like(paths[:1]), paths]), axis=0)
             bad = np.logical_not((vector_lengths(steps) <= SPEED_LIMIT * self.step).all(axis=0))
@@ -124,12 +127,6 @@ class SimulatedPhysics(Physics):
 
 
 REMEDY = "take a method that works on the path, such as kernel or path-drawn"
-
-
-def _velocity(instants: Instants) -> Array:
-    """Velocities u, v (S, 2) [m/s] at the instants; zero where they are not measured."""
-    zero = np.zeros(len(instants))
-    return np.stack([instants.columns.get(name, zero) for name in ("u", "v")], axis=-1)
 
 
 @dataclass(frozen=True)

@@ -155,7 +155,13 @@ def windows(
         Path() if isinstance(study, Plan) else Path(study).parent if Path(study).name == store.STUDY else Path(study)
     )
     folder = place if not isinstance(study, Plan) and (place / store.PROVENANCE).is_file() else None
-    plan = study if isinstance(study, Plan) else _find_plan(Path(study), folder, trust)
+    plan = (
+        study
+        if isinstance(study, Plan)
+        else read_plan(Path(study), trust=trust)
+        if folder is None
+        else store.stored_plan(folder, trust)
+    )
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
     if every:  # the tables that are to be made
@@ -185,10 +191,6 @@ def windows(
         write_json(folder / TRUTH_RECORD, {"with_truth": True})
     before = {steps for way in plan.methods for name in way.foundations for steps in steps_before(plan, name)}
     return StudyWindows(cut, keys, folds, paths, with_truth, sorted(before) if every else ())
-
-
-def _find_plan(place: Path, folder: Path | None, trust: bool) -> Plan:
-    return read_plan(place, trust=trust) if folder is None else store.stored_plan(folder, trust)
 
 
 def hide_future(cut: Windows, known: bool, with_truth: bool) -> Windows:

@@ -232,6 +232,17 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         "study resume folder --workers 3 --scheduler tcp://here --device gpu",
         {"folder": Path("folder"), "workers": 3, "scheduler": "tcp://here", "device": "gpu"},
     ),
+    **{
+        f"trust in {words.split(' ')[1]}": ("shipid.study.plan:build_plan", f"{words} --trust", {"trust": True})
+        for words in (f"study run {STUDY}", f"study screen {STUDY}")
+    },
+    "study windows": (
+        "shipid.study.windows:windows",
+        f"study windows {STUDY} --out w --N_D 6 --seed 3 --with-truth --every --trust --device gpu",
+        {"N_D": 6, "seed": 3, "with_truth": True, "every": True, "trust": True, "device": "gpu"},
+    ),
+    "trust of a document": ("shipid.study.plan:build_plan", f"simulate {STUDY} --trust", {"trust": True}),
+    "trust in a folder": ("shipid.study.store:stored_plan", "study resume folder --trust", {"trust": True}),
     "study compare": (
         "shipid.answer.compare:compare",
         "study compare one two --pair drawn=trained --pair a=b",
