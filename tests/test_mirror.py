@@ -26,6 +26,7 @@ ELSEWHERE = {
         for part in ("c_predictor", "c_vessel", "correctors", "equations", "known", "model", "recorder")
     },
     "export/fmu_c.py": "export/test_fmu.py",
+    "engine/fmu_process.py": "foundations/test_fmu.py",
     "hybrid/deployed.py": "test_predictor.py",
 }
 

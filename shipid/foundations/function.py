@@ -86,14 +86,18 @@ class SimulatorFunction(NamedSimulator):
         if ":" not in self.key:
             words = f"{self.key!r}: write 'module:function', or a name that Python put into FUNCTIONS"
             raise DocumentError(f"{words}: {suggest_name(self.key, FUNCTIONS.names)}")
-        if not self.trust:
-            words = f"{self.key} is code that this document names: read it"
-            raise DocumentError(f"{words}, and add --trust to run it (in Python: `read_plan(..., trust=True)`)")
+        self.require_trust()
         module, _, name = self.key.partition(":")
         found = getattr(held := import_users_module(module, self.file), name, None)
         if not callable(found):
             raise DocumentError(f"{self.key!r}: {module} has no function {name!r}: {suggest_name(name, vars(held))}")
         return cast(SimulateFunction, found)
+
+    def require_trust(self) -> None:
+        """Raise DocumentError where the code that a document names may not be run."""
+        if not self.trust:
+            words = f"{self.key} is code that this document names: read it"
+            raise DocumentError(f"{words}, and add --trust to run it (in Python: `read_plan(..., trust=True)`)")
 
     @property
     def code_digest(self) -> str:
@@ -104,19 +108,22 @@ class SimulatorFunction(NamedSimulator):
         """Leave a function of a file out: another process imports it anew."""
         return {name: value for name, value in vars(self).items() if name != "function"}
 
-    def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
-        """Return the states that the function gives, name -> (T, S); it is called with `BATCH` instants at most."""
-        columns, count = instants.columns, len(instants)
-        zero = np.zeros(count)
+    def arguments_of(self, instants: Instants, horizon: int) -> tuple[Array, dict[str, Array], dict[str, Array]]:
+        """States (S, 6), orders and weather, name -> (S, K), of instants."""
+        columns, zero = instants.columns, np.zeros(len(instants))
         begun = np.stack([np.asarray(columns.get(name, zero), float) for name in STATES], axis=-1)
         held = {name: values for name, values in columns.items() if "." in name}
         orders = {name: np.tile(values[:, None], horizon) for name, values in held.items()}
         orders |= {name: np.asarray(values)[:horizon].T for name, values in (instants.planned or {}).items()}
         weather = {name: np.tile(columns[name][:, None], horizon) for name in measurable_signals(columns)}
-        parts = []
-        for first in range(0, count, BATCH):
+        return begun, orders, weather
+
+    def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
+        """Return the states that the function gives, name -> (T, S); it is called with `BATCH` instants at most."""
+        (begun, *inputs), parts = self.arguments_of(instants, horizon), []
+        for first in range(0, len(instants), BATCH):
             some = slice(first, first + BATCH)
-            tables = ({name: values[some] for name, values in table.items()} for table in (orders, weather))
+            tables = ({name: values[some] for name, values in table.items()} for table in inputs)
             with locate_errors(self.key, self.function, "function"):
                 given = self.function(begun[some], *tables, step, **self.parameters)
             parts.append(as_float_array(f"states of {self.key}", given, DataError))

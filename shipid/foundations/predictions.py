@@ -86,7 +86,7 @@ class PredictionTable(NamedSimulator):
         values = ordered_values(self.frame, keys, names, Path(self.file))
         return {name: values[:, place].reshape(-1, horizon).T for place, name in enumerate(names)}
 
-    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> None:
+    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:
         """Refuse a table whose rows are not those of the study, and, with a remedy, one that seems to be wrong."""
         file, wanted = Path(self.file), study_keys((training, test), before)
         check_keys(self.frame, wanted, file, " --every")
@@ -94,6 +94,7 @@ class PredictionTable(NamedSimulator):
         doubt = doubt_of_places(np.stack([given[name] for name in PLACES], axis=-1), training)
         if doubt and remedy:
             raise DataError(f"{doubt}; {remedy}", file=self.file)
+        return ()
 
 
 def read_prediction_frame(file: Path) -> pd.DataFrame:

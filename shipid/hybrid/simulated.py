@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO
 from shipid.engine.rollout import SPEED_LIMIT
@@ -39,13 +40,19 @@ class Simulator(ABC):
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
         """Return north, east [m] and, where it knows them, psi [rad], u, v, r after 1..T steps, name -> (T, S)."""
 
-    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> None:
-        """Refuse a simulator that does not fit the windows of a study.
+    def along(self, dataset: Dataset) -> Simulator:
+        """Return the simulator with the runs of a study, which it may have to go along from their beginnings."""
+        del dataset
+        return self
+
+    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:
+        """Refuse a simulator that does not fit the windows of a study; what to note of it, in sentences.
 
         before : numbers of steps before each window at which it is asked, too. remedy : what to write where it only
             seems to be wrong; empty where it is taken so.
         """
         del training, test, before, remedy  # a function can be asked anywhere
+        return ()
 
     @abstractmethod
     def header(self) -> dict[str, Any]:

@@ -161,6 +161,9 @@ class Truth(CheckedModel, BaseModel):
 
     vessel: str
     set: dict[str, Any] = Field(default={}, description="dotted path -> number or block, added to the vessel")
+    fmu: str | None = Field(
+        default=None, description="an FMU that moves by the orders made for the vessel, in its place: as in a family"
+    )
     manoeuvres: Annotated[int, Field(ge=2, le=100000)]
     duration: Annotated[FiniteFloat, Field(gt=0, description="s of a run from the first instant of prediction on")]
     run_up: Annotated[FiniteFloat, Field(ge=0, description="s of a run, logged, before that instant")] = 0.0
@@ -214,6 +217,9 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
     unknown = next((name for name in truth.sensors if name not in columns), None)
     controls = Controls(vessel)
     for place, block in enumerate(truth.manoeuvre):
+        if truth.fmu is not None and KINDS[block.kind].reacts():
+            words = f"the helmsman of {block.kind} steers {truth.vessel}, not the FMU: take a kind with given orders"
+            raise DocumentError(words, path=f"truth.manoeuvre.{place}.kind")
         try:
             for end in (0.0, 1.0):  # of every range
                 block.manoeuvre(truth.length, lambda _, end=end: end).check(controls)  # type: ignore[misc]
@@ -273,13 +279,16 @@ def truth_vessel(truth: Truth, vessel: Vessel) -> Vessel:
         raise DocumentError(error.message, path=f"truth.set.{error.path}") from None
 
 
-def simulate_truth(truth: Truth, vessel: Vessel) -> pd.DataFrame:
+def simulate_truth(
+    truth: Truth, vessel: Vessel, perform: Callable[[pd.DataFrame], pd.DataFrame] = lambda log: log
+) -> pd.DataFrame:
     """Simulate and log all manoeuvres: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
     Mean wind, current and wave direction are constant in a run. Every run starts upright, so the first ten seconds of
     roll are a transient. u and v are horizontal, along and across the heading, and r = d(psi)/dt.
 
-    vessel : the ship, on which the values of `truth.set` are set.
+    vessel : the ship, on which the values of `truth.set` are set. perform : the log of the vessel -> that of another
+        ship by the same orders, before sensors measure it.
 
     Raises ShipidError for a truth that is none, DocumentError if it does not fit the vessel or a manoeuvre diverges.
     """
@@ -306,7 +315,7 @@ def simulate_truth(truth: Truth, vessel: Vessel) -> pd.DataFrame:
         )
     except ShipidError as error:
         raise DocumentError(error.message, path="truth") from None
-    frame = frame.drop(columns=[name for name in frame if str(name).startswith(ACTUAL)])
+    frame = perform(frame.drop(columns=[name for name in frame if str(name).startswith(ACTUAL)]))
     return measure_record(frame, truth.sensors, truth.interval, truth.seed) if truth.sensors else frame
 
 

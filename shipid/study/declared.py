@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
 from shipid import document as documents
+from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.foundations import SIMULATORS
 from shipid.hybrid.method import Method, misfit_words
@@ -59,6 +60,10 @@ class Foundation:
         source = self.source
         return source if isinstance(source, Vessel) else None
 
+    def along(self, dataset: Dataset) -> Foundation:
+        """Return the foundation with the runs that a simulator may have to go along."""
+        return replace(self, base=self.base.along(dataset)) if isinstance(self.base, Simulator) else self
+
     @property
     def source(self) -> Vessel | Simulator | None:
         """The base with the numbers of the variant."""
@@ -103,15 +108,23 @@ def bases_of(
     if family.base is not None:
         return [change_structure(family, named_vessel(family.base, file, f"{path}.base", known))]
     kind, value = next((kind, value) for kind in SIMULATORS if (value := getattr(family, kind)) is not None)
+    found = named_simulators(kind, value, file, f"{path}.{kind}", simulators, trust)
+    if family.structure or (family.perturb and kind == "predictions"):
+        raise DocumentError(f"{kind} has no structure, and a table no numbers: leave it out", path=f"{path}.{kind}")
+    return [*found]
+
+
+def named_simulators(
+    kind: str, value: Any, file: Path, path: str, simulators: dict[str, Simulator], trust: bool
+) -> list[Simulator]:
+    """Simulators that the study names at a path: known ones, or read now and known from now on."""
     names = [value] if isinstance(value, str) else value
     if any(name not in simulators for name in names):
         try:
             simulators |= {one.key: one for one in SIMULATORS[kind].read(value, file.parent, trust)}
         except ShipidError as error:
             words = f"{error.path}: {error.message}" if error.path else error.message
-            raise DocumentError(f"{error.file}: {words}" if error.file else words, path=f"{path}.{kind}") from None
-    if family.structure or (family.perturb and kind == "predictions"):
-        raise DocumentError(f"{kind} has no structure, and a table no numbers: leave it out", path=f"{path}.{kind}")
+            raise DocumentError(f"{error.file}: {words}" if error.file else words, path=path) from None
     return [simulators[name] for name in names]
 
 

@@ -37,6 +37,7 @@ from shipid.study.declared import (
     check_file_names,
     foundations_of,
     methods_of,
+    named_simulators,
     named_vessel,
 )
 from shipid.study.schema import Data, Study
@@ -401,6 +402,8 @@ def _check_and_expand(
         truth = truth_vessel(study.truth, base)
         check_truth(study.truth, truth)
         _check_memory(study.truth, truth)
+        if study.truth.fmu is not None:
+            named_simulators("fmu", study.truth.fmu, file, "truth.fmu", simulators, trust)
     digests = _sources(study.data, file) if sources is None else sources
     mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
     families = tuple(resolve_families(study.family, file))

@@ -44,6 +44,7 @@ from shipid.data.windows import (
 )
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
+from shipid.foundations.fmu import SimulatorFmu
 from shipid.hybrid.features import count_steps
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics, check_columns, missing_columns
@@ -57,7 +58,7 @@ from shipid.logs.segments import run_kind
 from shipid.metrics import position_error
 from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
-from shipid.simulation.truth import draw_manoeuvres, simulate_truth
+from shipid.simulation.truth import Truth, draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
 from shipid.study.plan import Batch, Plan, mapping_of, past_steps, path_from_study
 from shipid.study.schema import Study
@@ -136,7 +137,7 @@ def obtain_runs(plan: Plan) -> Dataset:
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
         with _name_study_file(plan):
-            frame = simulate_truth(study.truth, plan.truth)
+            frame = _simulate(plan, study.truth, plan.truth)
         runs = map(str, frame["run"].unique())
         kinds = {run: kind_in_name(kind_name(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
         manoeuvres = {run: kind for run, kind in kinds.items() if kind is not None}
@@ -149,6 +150,12 @@ def obtain_runs(plan: Plan) -> Dataset:
     assert source is not None
     log = fetch_log(source) if study.data.log is None else path_from_study(folder, study.data.log)
     return import_log(read_mapping(source), log, without=study.data.without)
+
+
+def _simulate(plan: Plan, truth: Truth, vessel: Vessel) -> pd.DataFrame:
+    """The runs of a truth, by its vessel or by its FMU."""
+    simulator = plan.simulators.get(truth.fmu or "")
+    return simulate_truth(truth, vessel, *([simulator.perform] if isinstance(simulator, SimulatorFmu) else []))
 
 
 def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]]:
@@ -180,7 +187,7 @@ def _against_truth(plan: Plan, test: Windows) -> Windows:
     truth = plan.study.truth
     if truth is None or plan.truth is None or not truth.sensors:
         return test
-    exact = simulate_truth(truth.model_copy(update={"sensors": {}, "interval": truth.step}), plan.truth)
+    exact = _simulate(plan, truth.model_copy(update={"sensors": {}, "interval": truth.step}), plan.truth)
     ahead, columns, future = test.step * np.arange(1, test.horizon + 1)[:, None], test.columns, test.future.copy()
     for run, rows in exact.groupby("run", sort=False):
         mine = test.run == run
@@ -262,15 +269,18 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         notes.append(
             f"runs that move as others do ({copies}): errors and intervals take them for new: leave out copies"
         )
+    plan = replace(plan, foundations=tuple(one.along(dataset) for one in plan.foundations))
+    looked_at: set[tuple[str, str]] = set()
     for foundation in plan.foundations:
         if isinstance(foundation.base, Vessel):
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
-        elif foundation.base is not None:
+        elif foundation.base is not None and (one := (foundation.family, foundation.base.key)) not in looked_at:
+            looked_at.add(one)
             place = f"family.{foundation.family}.predictions"
             meant = any(documents.match_paths(str(one), [place]) for one in plan.study.unusual)
             remedy = "" if meant else f'if it is meant so, write unusual = ["{place}"] at the top of the study'
-            foundation.base.check(rest, test, steps_before(plan, foundation.name), remedy)
+            notes += foundation.base.check(rest, test, steps_before(plan, foundation.name), remedy)
     for way in plan.methods:
         if absent := [name for name in way.method.traits.memory.states if name not in test.columns]:
             raise DocumentError(

@@ -208,6 +208,7 @@ class Family(CheckedModel, BaseModel):
     function: str | None = Field(
         default=None, description='a function of Python in place of a base, such as "my_ship:simulate"'
     )
+    fmu: str | None = Field(default=None, description="an FMU, or the document of its table, in place of a base")
     extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
     members: Annotated[int, Field(ge=1, le=100000)] = 1
     seed: int = 0
@@ -302,7 +303,7 @@ def patch_text(
     return tomlkit.dumps(patch)
 
 
-SOURCES = ("base", "predictions", "function")
+SOURCES = ("base", "predictions", "function", "fmu")
 """Keys of a family, one of which says where its paths come from."""
 
 

@@ -186,7 +186,7 @@ def test_the_page_of_simulators_runs_as_printed(tmp_path: Path, monkeypatch: pyt
     page = (Path(__file__).parents[2] / "docs" / "own-simulator.md").read_text(encoding="utf-8")
     for name, code in re.findall(r"^```python\n# (\w+\.py)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
         (tmp_path / name).write_text(code)
-    (families,) = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (families, _) = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     study = TINY.read_text().split("[[family]]")[0]
     (tmp_path / "mine.toml").write_text(study + families)
     (tmp_path / "table.toml").write_text(f'{study}[[family]]\nname = "mine"\npredictions = "paths.parquet"\n')
