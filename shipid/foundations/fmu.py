@@ -215,7 +215,11 @@ class SimulatorFmu(SimulatorFunction):
         motion, faults = self.simulate(states, ahead, float(np.diff(columns["t"][0, :2])[0]), along)
         if faults:
             raise DataError(f"the FMU fails: {faults[0]}", file=self.file)
-        others = [name for name in frame if name in SIGNALS and SIGNALS[name].role == "motion" and name not in STATES]
+        others = [
+            name
+            for name in map(str, frame)
+            if name in SIGNALS and SIGNALS[name].role == "motion" and name not in STATES
+        ]
         moved = {name: motion[..., place].ravel() for place, name in enumerate(STATES)}
         return frame.drop(columns=others).assign(**moved)
 
