@@ -219,7 +219,7 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "name in C": (lambda: exported(name=3), "name must be a str, such as"),
     "estimates": (
         lambda: shipid.figures.estimates(ANY),
-        "source must be an Identification, as of `run_identification`",
+        "source must be an IdentificationContent, as of `run_identification`",
     ),
     "track": (lambda: shipid.figures.track(ANY), "source must be a MeasuredManoeuvre, as of `measure_standard`"),
     "no cells": (lambda: shipid.figures.error_map({}), "source must be a Results"),

@@ -10,7 +10,7 @@ import numpy as np
 from casadi import MX
 
 from shipid.hybrid.forest import ForestCorrector, Trees
-from shipid.hybrid.kernel import KernelCompensator
+from shipid.hybrid.kernel_compensator import KernelCompensator
 from shipid.hybrid.method import Corrector
 from shipid.hybrid.modules import Alarm, ModulesCorrector
 

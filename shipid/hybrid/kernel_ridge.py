@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from torch import Tensor
 
 from shipid.hybrid.compensator import unflatten_paths
-from shipid.hybrid.kernel import GROUPS, KernelCompensator, KernelMember, kernel_group, kernel_values
+from shipid.hybrid.kernel_compensator import GROUPS, KernelCompensator, KernelMember, kernel_group, kernel_values
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_folds

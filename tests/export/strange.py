@@ -14,7 +14,7 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
 from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import HankelCorrector, LinearLaw
-from shipid.hybrid.kernel import KernelCompensator, KernelMember
+from shipid.hybrid.kernel_compensator import KernelCompensator, KernelMember
 from shipid.hybrid.learned_force import HIDDEN, OUTPUT, ForceCorrector
 from shipid.hybrid.modules import Alarm, ModulesCorrector, modules_of
 from shipid.hybrid.novelty import alarm_inputs, calibrate_alarm

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from shipid.hybrid.compensator import smooth_basis
-from shipid.hybrid.kernel import GROUPS, Kernel, KernelCompensator, kernel_group, kernel_values
+from shipid.hybrid.kernel import Kernel
+from shipid.hybrid.kernel_compensator import KernelCompensator
 from tests.hybrid.tasks import compensation
 from tests.hybrid.test_ridge import RUDDER, STEPS, TWINS, drawn, mirrored, missed, tuned
 
@@ -81,12 +82,3 @@ def test_only_scales_of_inputs_that_there_are_are_searched() -> None:
     columns = {name: values for name, values in drawn().items() if name not in ("V_w", "beta_w")}
     fit = tuned(columns, {"one": missed(columns)}, SMALL)["one"]
     assert {*fit.trials[0]["params"]} == {*SMALL.ranges()} - {"wind_scale"}
-
-
-def test_groups_and_values_by_hand() -> None:
-    names = ("u", "port.n", "V_w_rw", "port.past-2.n", "turned-5.psi", "past-4.x", "past-4.y", "past-4.u", "error-8.x")
-    groups = ("motion", "command", "wind", "history", "turned", "position", "position", "history", "error")
-    assert tuple(map(kernel_group, names)) == groups
-    assert set(groups) <= set(GROUPS)
-    made = kernel_values(np.array([[1.0, 2.0]]), np.array([[1.0, 2.0], [3.0, 2.0]]), 0.5)
-    np.testing.assert_allclose(made, [[1 + 0.5 * 6, np.exp(-2) + 0.5 * 8]])
