@@ -233,7 +233,7 @@ def test_a_file_that_is_tried_is_a_module(tmp_path: Path, monkeypatch: pytest.Mo
         (
             "tried_raises.py",
             "\n1 / 0\n",
-            r"tried_raises\.py: --with: ZeroDivisionError: division by zero in .*, line 2$",
+            r"tried_raises\.py: cannot be imported: ZeroDivisionError: division by zero in .*, line 2$",
         ),
         ("tried_ends.py", "import sys\nsys.exit('no')\n", r"SystemExit: no in .*tried_ends\.py, line 2$"),
         ("tried_odd.py", "def f(:\n", r"SyntaxError: .*tried_odd\.py, line 1"),

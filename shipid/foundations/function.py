@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import inspect
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
@@ -21,7 +17,7 @@ from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
 from shipid.physics.signals import measurable_signals
-from shipid.plugins import Registry, fault_of_kind
+from shipid.plugins import Registry, fault_of_kind, import_user_module
 from shipid.users import locate_errors, users_code
 
 SimulateFunction = Callable[..., Any]
@@ -88,7 +84,7 @@ class SimulatorFunction(NamedSimulator):
             raise DocumentError(f"{words}: {suggest_name(self.key, FUNCTIONS.names)}")
         self.require_trust()
         module, _, name = self.key.partition(":")
-        found = getattr(held := import_users_module(module, self.file), name, None)
+        found = getattr(held := import_user_module(module, self.file), name, None)
         if not callable(found):
             raise DocumentError(f"{self.key!r}: {module} has no function {name!r}: {suggest_name(name, vars(held))}")
         return cast(SimulateFunction, found)
@@ -147,26 +143,3 @@ def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:
         for name, value in values.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
     }
-
-
-@cache
-def import_users_module(name: str, file: str) -> ModuleType:
-    """A module of a file, which may import its neighbours, or one that Python finds; DocumentError where it fails."""
-    folder = str(Path(file).parent) if file else ""
-    try:
-        if not file:
-            return importlib.import_module(name)
-        spec = importlib.util.spec_from_file_location(name, file)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.path.insert(0, folder)
-        try:
-            sys.modules.setdefault(name, module)  # not in place of another one, such as of another study
-            spec.loader.exec_module(module)
-        finally:
-            sys.path.remove(folder)
-        return module
-    except (Exception, SystemExit) as error:
-        where = f" in {file}" if file else ""
-        raise DocumentError(f"{name}{where} cannot be imported ({type(error).__name__}: {error})") from None

@@ -134,10 +134,7 @@ def study_keys(parts: Sequence[Windows], before: Collection[int]) -> pd.MultiInd
         steps = cut.step * np.arange(1, max(cut.horizon, *before, 0) + 1)
         wanted.append(prediction_keys(cut.run, cut.t, steps[: cut.horizon]))
         wanted += [prediction_keys(cut.run, cut.t - count * cut.step, steps[:count]) for count in before]
-    keys = wanted[0]
-    for more in wanted[1:]:
-        keys = keys.append(more)
-    return keys.drop_duplicates()
+    return wanted[0].append(wanted[1:]).drop_duplicates()
 
 
 def check_keys(frame: pd.DataFrame, wanted: pd.MultiIndex, file: Path, option: str = "") -> None:

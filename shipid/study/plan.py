@@ -44,6 +44,7 @@ from shipid.study.schema import Data, Study
 from shipid.users import is_user_code, users_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve_families
+from shipid.vessel.ranges import UNUSUAL
 from shipid.vessel.schema import equation_functions
 
 WITH = "+"  # between a foundation and a method
@@ -525,9 +526,6 @@ def _check_memory(truth: Truth, vessel: Vessel) -> None:
             raise DocumentError(words, path=f"truth.{path}")
 
 
-UNUSUAL_KEY = "unusual"
-"""Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
-
 RANGES: dict[str, tuple[float, float, str]] = {
     "truth.duration": (0.0, LONGEST, "s"),
     "truth.run_up": (0.0, LONGEST, "s"),
@@ -556,7 +554,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 
 def check_ranges(document: Document) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
-    meant = document.get(UNUSUAL_KEY, [])
+    meant = document.get(UNUSUAL, [])
     for path, value in documents.document_leaves(document):
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
@@ -567,5 +565,5 @@ def check_ranges(document: Document) -> None:
         least, most, unit = limits
         if not least <= value <= most:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
-            remedy = f'if it is meant, write {UNUSUAL_KEY} = ["{named}"] at the top of the study'
+            remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
             raise DocumentError(f"{message}; {remedy}", path=path)

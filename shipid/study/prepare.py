@@ -277,8 +277,8 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
             notes += not_measured(foundation.base, test)
         elif foundation.base is not None and (one := (foundation.family, foundation.base.key)) not in looked_at:
             looked_at.add(one)
-            place = f"family.{foundation.family}.predictions"
-            meant = any(documents.match_paths(str(one), [place]) for one in plan.study.unusual)
+            place = f"family.{foundation.family}.{foundation.base.kind}"
+            meant = any(documents.match_paths(str(pattern), [place]) for pattern in plan.study.unusual)
             remedy = "" if meant else f'if it is meant so, write unusual = ["{place}"] at the top of the study'
             notes += foundation.base.check(rest, test, steps_before(plan, foundation.name), remedy)
     for way in plan.methods:
