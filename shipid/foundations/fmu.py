@@ -23,11 +23,12 @@ from shipid import document as documents
 from shipid.arguments import whole_steps
 from shipid.checked import CheckedModel, Positive
 from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
-from shipid.data.windows import Instants, Windows, from_frame
+from shipid.data.windows import Instants, Windows, from_frame, to_frame
 from shipid.engine.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
-from shipid.foundations.function import STATES, SimulatorFunction
+from shipid.foundations.function import SimulatorFunction
 from shipid.logs.mapping import UNITS
+from shipid.observer import MEASURED_MOTION
 from shipid.physics.signals import ACTUAL, SIGNALS, is_command, signal_of
 from shipid.units import DEGREE
 
@@ -200,7 +201,7 @@ class SimulatorFmu(SimulatorFunction):
         motion, faults = self.simulate(begun, orders | weather, step, self._along(instants, step))
         if faults:
             log.warning("%s fails in %d of %d runs; the first: %s", self.key, len(faults), len(motion), faults[0])
-        return {name: motion[:, 1:, place].T for place, name in enumerate(STATES)}
+        return {name: motion[:, 1:, place].T for place, name in enumerate(MEASURED_MOTION)}
 
     def perform(self, frame: pd.DataFrame) -> pd.DataFrame:
         """The runs of a log with the motion of the FMU by the same orders, from the same start; DataError if it fails.
@@ -209,18 +210,18 @@ class SimulatorFmu(SimulatorFunction):
         """
         runs = [rows for _, rows in frame.groupby("run", sort=False)]
         columns = {name: values.reshape(len(runs), -1) for name, values in _columns(frame).items()}
-        states = np.stack([columns[name][:, 0] for name in STATES], axis=-1)
+        states = np.stack([columns[name][:, 0] for name in MEASURED_MOTION], axis=-1)
         along = [Along({name: columns[name][place] for name in columns}, [place], [0]) for place in range(len(runs))]
-        ahead = {name: values[:, :-1] for name, values in columns.items() if name not in STATES}
+        ahead = {name: values[:, :-1] for name, values in columns.items() if name not in MEASURED_MOTION}
         motion, faults = self.simulate(states, ahead, float(np.diff(columns["t"][0, :2])[0]), along)
         if faults:
             raise DataError(f"the FMU fails: {faults[0]}", file=self.file)
         others = [
             name
             for name in map(str, frame)
-            if name in SIGNALS and SIGNALS[name].role == "motion" and name not in STATES
+            if name in SIGNALS and SIGNALS[name].role == "motion" and name not in MEASURED_MOTION
         ]
-        moved = {name: motion[..., place].ravel() for place, name in enumerate(STATES)}
+        moved = {name: motion[..., place].ravel() for place, name in enumerate(MEASURED_MOTION)}
         return frame.drop(columns=others).assign(**moved)
 
     def _along(self, instants: Instants, step: float) -> list[Along]:
@@ -256,7 +257,7 @@ class SimulatorFmu(SimulatorFunction):
         states : (S, 6) north, east [m], psi [rad], u, v [m/s], r [rad/s]. inputs : orders and weather, name -> (S, K)
             [SI]. along : the runs of the windows; without them actuators begin at their orders.
         """
-        begun, every = dict(zip(STATES, np.asarray(states, float).T, strict=True)), self.steps_within(step)
+        begun, every = dict(zip(MEASURED_MOTION, np.asarray(states, float).T, strict=True)), self.steps_within(step)
         given = self._variables("input", {"psi": begun["psi"][:, None], **inputs}).repeat(every, axis=1).tolist()
         names = {link.signal for link in self.fmu.links["start"]}
         reached = {name for name in names if name.startswith(ACTUAL)}
@@ -283,8 +284,8 @@ class SimulatorFmu(SimulatorFunction):
                     runs.append(FmuRun(start, record[last or 0 : row], given[place], self.fmu.branches))
                     last = row if self.fmu.branches else None
         found, faults = self._signals(runs, step / every, every)
-        motion = np.full((len(given), len(given[0]) // every + 1, len(STATES)), np.nan)
-        motion[list(order)] = [np.stack([one[name] for name in STATES], axis=-1) for one in found]
+        motion = np.full((len(given), len(given[0]) // every + 1, len(MEASURED_MOTION)), np.nan)
+        motion[list(order)] = [np.stack([one[name] for name in MEASURED_MOTION], axis=-1) for one in found]
         turned = not (self.fmu.startable and "psi" in names)
         return _move_motion(motion, states, turned or not {"north", "east"} <= names, turned), faults
 
@@ -294,7 +295,10 @@ class SimulatorFmu(SimulatorFunction):
         state : (6,) at the start. inputs, changes : name -> value, and how much more it is from the start on [SI].
         DocumentError where heading and place do not follow from r, u and v: a wrong sign, unit or frame.
         """
-        step, still = self.fmu.table.step or RESPONSE / 200, dict(zip(STATES, np.reshape(state, (6, 1)), strict=True))
+        step, still = (
+            self.fmu.table.step or RESPONSE / 200,
+            dict(zip(MEASURED_MOTION, np.reshape(state, (6, 1)), strict=True)),
+        )
         held = [
             {key: np.array([value + changes[one] * (key == one)]) for key, value in inputs.items()} for one in changes
         ]
@@ -315,9 +319,9 @@ class SimulatorFmu(SimulatorFunction):
         """Raise DocumentError where changes of heading and place are not the integrals of r, u and v."""
         north, east, psi, u, v, r = np.moveaxis(motion, -1, 0)
         middle, *rates = [(one[:, 1:] + one[:, :-1]) / 2 for one in (psi, r, u, v)]
-        along = np.diff(north + 1j * east) * np.exp(-1j * middle)
+        along, across = to_frame(np.diff(north), np.diff(east), 0.0, 0.0, middle)
         fastest = np.hypot(*rates[1:]).max()
-        for name, change, rate in zip("ruv", (np.diff(psi), along.real, along.imag), rates, strict=True):
+        for name, change, rate in zip("ruv", (np.diff(psi), along, across), rates, strict=True):
             size = float((rate**2).sum())
             slope = float((change * rate).sum()) / (step * size) if size else 1.0
             if abs(slope - 1) > SLOPE and (name != "v" or np.sqrt(size) > SLOPE * fastest):
@@ -350,8 +354,8 @@ class SimulatorFmu(SimulatorFunction):
             )
         values = dict(signals)
         if any(link.over_ground for link in links):
-            over = (signals["u"] + 1j * signals["v"]) * np.exp(1j * signals["psi"])
-            values |= {"ned u": over.real, "ned v": over.imag, "enu u": over.imag, "enu v": over.real}
+            north, east = from_frame(signals["u"], signals["v"], 0.0, 0.0, signals["psi"])
+            values |= {"ned u": north, "ned v": east, "enu u": east, "enu v": north}
         keys = [f"{link.row.frame} {link.signal}" if link.over_ground else link.signal for link in links]
         found = [link.to_variable(values[key]) for key, link in zip(keys, links, strict=True)]
         return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.empty((*np.shape(signals["psi"]), 0))
@@ -375,9 +379,8 @@ class SimulatorFmu(SimulatorFunction):
                 values["psi"] = np.unwrap(values["psi"])
                 frames = {link.row.frame for link in links if link.over_ground}
                 if frames:
-                    over = values["u"] + 1j * values["v"] if frames == {"ned"} else values["v"] + 1j * values["u"]
-                    ahead = over * np.exp(-1j * values["psi"])
-                    values |= {"u": ahead.real, "v": ahead.imag}
+                    over = [values[name] for name in ("uv" if frames == {"ned"} else "vu")]
+                    values |= dict(zip("uv", to_frame(*over, 0.0, 0.0, values["psi"]), strict=True))
                 found.append(values)
                 faults += [fault] if fault else []
         return found, faults
@@ -393,9 +396,8 @@ def _move_motion(motion: Array, states: Array, moved: bool, turned: bool) -> Arr
     motion, goal = motion.copy(), np.asarray(states, float)
     turn = goal[:, 2:3] - motion[:, :1, 2] if turned else 0.0 * goal[:, 2:3]
     if moved:
-        way = motion[..., 0] + 1j * motion[..., 1]
-        way = (way - way[:, :1]) * np.exp(1j * turn) + (goal[:, :1] + 1j * goal[:, 1:2])
-        motion[..., 0], motion[..., 1] = way.real, way.imag
+        way = to_frame(*np.moveaxis(motion[..., :2], -1, 0), motion[:, :1, 0], motion[:, :1, 1], -turn)
+        motion[..., 0], motion[..., 1] = from_frame(*way, goal[:, :1], goal[:, 1:2], 0.0)
     motion[..., 2] += turn
     return motion
 
@@ -426,7 +428,10 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
             for role, link in _links_of_row(signal, row, variables, file):
                 links[role].append(link)
     have = {link.signal for link in links["output"]}
-    missing = {"output": [name for name in STATES if name not in have], "input": [] if links["input"] else ["orders"]}
+    missing = {
+        "output": [name for name in MEASURED_MOTION if name not in have],
+        "input": [] if links["input"] else ["orders"],
+    }
     for role, names in missing.items():
         if names:
             there = ", ".join(one.name for one in variables.values() if one.causality in ROLES[role]) or "none"
@@ -468,7 +473,7 @@ def _read_description(path: Path) -> Any:
 def _is_signal(name: str) -> bool:
     """Whether a name is that of a state, an order or the weather."""
     return (
-        name in STATES
+        name in MEASURED_MOTION
         or is_command(name.removeprefix(ACTUAL))
         or (name in SIGNALS and SIGNALS[name].role == "environment")
     )
@@ -478,7 +483,7 @@ def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: 
     """Role and link of a row; of an output that may be set before the start, too, two."""
     path = f"fmu.{signal}"
     if not _is_signal(signal):
-        words = f"no signal: give {', '.join(STATES)}, an order such as rudder.delta, or wind such as V_w"
+        words = f"no signal: give {', '.join(MEASURED_MOTION)}, an order such as rudder.delta, or wind such as V_w"
         raise DocumentError(words, file=file, path=path)
     if row.variable not in variables:
         words = f"no real variable {row.variable!r}: {suggest_name(row.variable, variables)}"
@@ -486,7 +491,7 @@ def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: 
     variable = variables[row.variable]
     roles = [role for role, kinds in ROLES.items() if variable.causality in kinds]
     role: Any = row.role or next(iter(roles), None)
-    if role not in roles or role == ("input" if signal in STATES or signal.startswith(ACTUAL) else "output"):
+    if role not in roles or role == ("input" if signal in MEASURED_MOTION or signal.startswith(ACTUAL) else "output"):
         words = f"{row.variable!r} has the causality {variable.causality}, no {role or 'variable'} of {signal}"
         raise DocumentError(words, file=file, path=f"{path}.role")
     si = SIGNALS[signal_of(signal)].unit

@@ -16,6 +16,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
+from shipid.observer import MEASURED_MOTION
 from shipid.physics.signals import measurable_signals
 from shipid.plugins import Registry, fault_of_kind, import_user_module
 from shipid.users import locate_errors, users_code
@@ -23,7 +24,6 @@ from shipid.users import locate_errors, users_code
 SimulateFunction = Callable[..., Any]
 FUNCTIONS: Registry[SimulateFunction] = Registry("shipid.foundations", partial(fault_of_kind, Callable))
 """Name, as after `function = ` in a document -> function, of Python or an installed package: it needs no trust."""
-STATES = ("north", "east", "psi", "u", "v", "r")
 ARGUMENTS = ("states", "orders", "weather", "step")
 BATCH = 1000  # instants of a call: 300 steps of 20 columns are 48 MB
 
@@ -107,7 +107,7 @@ class SimulatorFunction(NamedSimulator):
     def arguments_of(self, instants: Instants, horizon: int) -> tuple[Array, dict[str, Array], dict[str, Array]]:
         """States (S, 6), orders and weather, name -> (S, K), of instants."""
         columns, zero = instants.columns, np.zeros(len(instants))
-        begun = np.stack([np.asarray(columns.get(name, zero), float) for name in STATES], axis=-1)
+        begun = np.stack([np.asarray(columns.get(name, zero), float) for name in MEASURED_MOTION], axis=-1)
         held = {name: values for name, values in columns.items() if "." in name}
         orders = {name: np.tile(values[:, None], horizon) for name, values in held.items()}
         orders |= {name: np.asarray(values)[:horizon].T for name, values in (instants.planned or {}).items()}
@@ -123,10 +123,12 @@ class SimulatorFunction(NamedSimulator):
             with locate_errors(self.key, self.function, "function"):
                 given = self.function(begun[some], *tables, step, **self.parameters)
             parts.append(as_float_array(f"states of {self.key}", given, DataError))
-            if parts[-1].shape != (wanted := (len(begun[some]), horizon, len(STATES))):
-                raise DataError(f"{self.key} must give states {wanted}, {', '.join(STATES)}, not {parts[-1].shape}")
-        every = np.concatenate(parts) if parts else np.empty((0, horizon, len(STATES)))
-        return {name: every[..., place].T for place, name in enumerate(STATES)}
+            if parts[-1].shape != (wanted := (len(begun[some]), horizon, len(MEASURED_MOTION))):
+                raise DataError(
+                    f"{self.key} must give states {wanted}, {', '.join(MEASURED_MOTION)}, not {parts[-1].shape}"
+                )
+        every = np.concatenate(parts) if parts else np.empty((0, horizon, len(MEASURED_MOTION)))
+        return {name: every[..., place].T for place, name in enumerate(MEASURED_MOTION)}
 
 
 def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:

@@ -203,22 +203,29 @@ def count_steps(seconds: float, step: float) -> int:
     return max(round(seconds / step), 1)
 
 
+def earlier_instants(instants: Instants, steps: int, step: float, *, placed: bool = True) -> Instants:
+    """Instants so many steps [s] before others, with the orders given since.
+
+    placed : whether they have north, east [m] of the ship, too; else its place is the origin.
+    """
+    then = {name: values[-steps] for name, values in instants.past.items()}
+    given = {name: values[-steps:] for name, values in instants.past.items() if "." in name}
+    if placed:
+        places = from_frame(then["x"], then["y"], *(instants.columns[name] for name in ("north", "east", "psi")))
+        then |= dict(zip(("north", "east"), places, strict=True))
+    return Instants(then, planned=given, run=instants.run, t=None if instants.t is None else instants.t - steps * step)
+
+
 def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str, Array]:
     """Errors (S,) at the instants of a prediction by the physics from `seconds` before, with the commands given since.
 
     x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
     velocities [m/s, rad/s], where the physics says them. A prediction that diverged gives zeros.
     """
-    steps = count_steps(seconds, physics.step)
-    past, columns = instants.past, instants.columns
+    steps, columns = count_steps(seconds, physics.step), instants.columns
     value_before(instants, "x", seconds, physics.step)
-    then = {name: values[-steps] for name, values in past.items()}
-    given = {name: values[-steps:] for name, values in past.items() if "." in name}
-    if physics.vessel is None:  # a simulator is asked where the ship was
-        places = from_frame(then["x"], then["y"], *(columns[name] for name in ("north", "east", "psi")))
-        then |= dict(zip(("north", "east"), places, strict=True))
-    before, t = replace(physics, horizon=steps), None if instants.t is None else instants.t - steps * physics.step
-    begun = Instants(then, planned=given, run=instants.run, t=t)
+    begun = earlier_instants(instants, steps, physics.step, placed=physics.vessel is None)  # as a simulator asks
+    then, before = begun.columns, replace(physics, horizon=steps)
     ends = {name: values[-1] for name, values in before.states(begun).items()}
     turned = columns["psi"] - then["psi"]
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
