@@ -87,7 +87,9 @@ def test_a_ship_without_start_values_runs_along_the_run(folder, version, branche
     np.testing.assert_allclose(found[:, 1:], motion_of_ship(turned, known, STEP), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("fault", "words"), [(1, "status 3"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")])
+@pytest.mark.parametrize(
+    ("fault", "words"), [(1, "5 s (the shaft is stuck)"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")]
+)
 def test_a_failing_ship_is_lost_from_there_on(folder, fault, words):
     """An error keeps what was before; the first window does not take the second one with it."""
     fmu = as_fmu(write_table(build_ship(folder / "fails.fmu"), more="limit = 1"))
