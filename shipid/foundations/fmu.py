@@ -63,13 +63,11 @@ class FmuRow(BaseModel):
 
 
 class FmuTable(CheckedModel, BaseModel):
-    """`[fmu]`: a file, its step, and a row, or a list of rows, for each signal."""
+    """Keys of `[fmu]` beside its rows: a row, or a list of rows, for each signal."""
 
-    model_config = ConfigDict(extra="forbid")
     file: str
     step: Annotated[Positive | None, Field(description="s of communication; default: that of the prediction")] = None
     limit: Annotated[Positive, Field(description="s that one run may take")] = 60.0
-    rows: dict[str, list[FmuRow]] = {}
 
 
 @dataclass(frozen=True)
@@ -411,19 +409,26 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
     raw = {"file": file.name} if file.suffix == ".fmu" else documents.read_document(file).get("fmu")
     if not isinstance(raw, dict):
         raise DocumentError("has no table [fmu]: give file, step, and a row for each signal", file=file)
-    own = {key: raw[key] for key in FmuTable.model_fields.keys() - {"rows"} if key in raw}
-    rows = {key: row if isinstance(row, list) else [row] for key, row in raw.items() if key not in own}
-    table: FmuTable = documents.parse_model(FmuTable, own | {"rows": rows}, file, "fmu")
+    own = {key: raw[key] for key in FmuTable.model_fields if key in raw}
+    table: FmuTable = documents.parse_model(FmuTable, own, file, "fmu")
+    rows: dict[str, list[FmuRow]] = {
+        signal: [
+            documents.parse_model(FmuRow, row, file, f"fmu.{signal}")
+            for row in (its if isinstance(its, list) else [its])
+        ]
+        for signal, its in raw.items()
+        if signal not in own
+    }
     path = documents.find_document(Path(table.file), "models", file.parent)
     description = _read_description(path)
     variables = {
         one.name: one for one in description.modelVariables if one.type in ("Real", "Float64") and not one.dimensions
     }
     for one in variables.values():  # by its name, where no row says else
-        if one.causality in ("input", "output") and _is_signal(one.name) and one.name not in table.rows:
-            table.rows[one.name] = [FmuRow(variable=one.name)]
+        if one.causality in ("input", "output") and _is_signal(one.name):
+            rows.setdefault(one.name, [FmuRow(variable=one.name)])
     links: dict[str, list[Link]] = {role: [] for role in ROLES}
-    for signal, its in table.rows.items():
+    for signal, its in rows.items():
         for row in its:
             for role, link in _links_of_row(signal, row, variables, file):
                 links[role].append(link)
@@ -442,7 +447,7 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
     free = {name: one for name, one in free.items() if one.valueReference not in used}
     return Fmu(
         path,
-        hashlib.sha256(path.read_bytes() + table.model_dump_json().encode()).hexdigest()[:8],
+        hashlib.sha256(path.read_bytes() + documents.digest_document(raw).encode()).hexdigest()[:8],
         table,
         links | {"start": links["start"] + links["parameter"]},
         {name: float(one.start) for name, one in free.items()},

@@ -121,6 +121,9 @@ def test_what_a_ship_prints_goes_nowhere(folder, capfd):
         ('variable = "rudder"', 'variable = "rate"', "'rate' has the causality output, no output of rudder.delta"),
         ('"rudder.delta"', '"rudder.angle"', "no signal: give north, east"),
         ("file =", "fil =", "missing"),
+        ('variable = "rpm"', 'variables = "rpm"', "fmu.propeller.n.variables: unknown key"),
+        ("scale = -1", "scale = true", "fmu.v.scale: "),
+        ("scale = -1", "scale = 0", "a scale that is not 0"),
         ("limit = 1", "limit = -1", "must be"),
     ],
 )  # fmt: skip
