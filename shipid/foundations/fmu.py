@@ -377,8 +377,8 @@ class SimulatorFmu(SimulatorFunction):
                 values["psi"] = np.unwrap(values["psi"])
                 frames = {link.row.frame for link in links if link.over_ground}
                 if frames:
-                    over = [values[name] for name in ("uv" if frames == {"ned"} else "vu")]
-                    values |= dict(zip("uv", to_frame(*over, 0.0, 0.0, values["psi"]), strict=True))
+                    north, east = (values[name] for name in ("uv" if frames == {"ned"} else "vu"))
+                    values |= dict(zip("uv", to_frame(north, east, 0.0, 0.0, values["psi"]), strict=True))
                 found.append(values)
                 faults += [fault] if fault else []
         return found, faults
@@ -394,8 +394,8 @@ def _move_motion(motion: Array, states: Array, moved: bool, turned: bool) -> Arr
     motion, goal = motion.copy(), np.asarray(states, float)
     turn = goal[:, 2:3] - motion[:, :1, 2] if turned else 0.0 * goal[:, 2:3]
     if moved:
-        way = to_frame(*np.moveaxis(motion[..., :2], -1, 0), motion[:, :1, 0], motion[:, :1, 1], -turn)
-        motion[..., 0], motion[..., 1] = from_frame(*way, goal[:, :1], goal[:, 1:2], 0.0)
+        x, y = to_frame(motion[..., 0], motion[..., 1], motion[:, :1, 0], motion[:, :1, 1], -turn)
+        motion[..., 0], motion[..., 1] = x + goal[:, :1], y + goal[:, 1:2]
     motion[..., 2] += turn
     return motion
 
@@ -433,7 +433,7 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
             for role, link in _links_of_row(signal, row, variables, file):
                 links[role].append(link)
     have = {link.signal for link in links["output"]}
-    missing = {
+    missing: dict[str, list[str]] = {
         "output": [name for name in MEASURED_MOTION if name not in have],
         "input": [] if links["input"] else ["orders"],
     }

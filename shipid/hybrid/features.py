@@ -192,9 +192,9 @@ def observer_inputs(instants: Instants) -> dict[str, Array]:
     """
     known, columns = instants.estimates, instants.columns
     table = {f"observer-force.{motion}": known[f"observer.{name}"] for motion, name in zip(MOTIONS, "XYN", strict=True)}
-    c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
-    north, east = known["observer.current_north"], known["observer.current_east"]
-    table |= {"observer-current.u": c * north + s * east, "observer-current.v": c * east - s * north}
+    north, east = (known[f"observer.current_{axis}"] for axis in ("north", "east"))
+    through = to_frame(north, east, 0.0, 0.0, columns["psi"])
+    table |= dict(zip(("observer-current.u", "observer-current.v"), through, strict=True))
     return table | {f"observer-wave.{name}": columns[name] - known[f"observer.{name}"] for name in MOTIONS}
 
 
@@ -230,8 +230,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     turned = columns["psi"] - then["psi"]
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
     dx, dy = x0 - ends["x"], y0 - ends["y"]
-    c, s = np.cos(turned), np.sin(turned)
-    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
+    errors = dict(zip("xy", to_frame(dx, dy, 0.0, 0.0, turned), strict=True))
     errors |= {name: columns[name] - ends[name] for name in MOTIONS if name in ends}
     sound = (np.abs(np.stack([*errors.values()])) < np.inf).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}

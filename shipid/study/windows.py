@@ -110,7 +110,7 @@ class StudyWindows:
         then = earlier_instants(cut.instants(), count, cut.step)
         given = {name: cut.past[name][-count:] for name in names["orders"]}
         given |= {name: np.tile(then.columns[name], (count, 1)) for name in names["wind"]}
-        now = {"run": cut.run, "instant": then.t, "split": "earlier", "fold": -1}
+        now: dict[str, Any] = {"run": cut.run, "instant": then.t, "split": "earlier", "fold": -1}
         now |= {name: then.columns[name] for name in (*names["state"], *names["wind"], *names["orders"])}
         cut = replace(cut, t=now["instant"])
         return {
