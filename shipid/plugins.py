@@ -100,8 +100,8 @@ class Registry(dict[str, Member]):
 
     def name_of(self, member: Member) -> str | None:
         """Name of a member; None for an object that is none."""
-        looks: tuple[Callable[[], dict[str, Member]], ...] = (lambda: self, self.load_all)
-        return next((name for look in looks for name, one in look().items() if one is member), None)
+        here = [name for name, one in self.items() if one is member]
+        return next(iter(here or [name for name, one in self.load_all().items() if one is member]), None)
 
 
 @cache

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from typing import Any
 
 Rows = list[list[float]]
 MOST_ENDS = 3  # how often an FMU may hang or end its process before its other runs are given up
@@ -65,8 +64,15 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
         (here, there), allowed = Pipe(), TO_LOAD
         command = [sys.executable, "-uP", "-m", "shipid.engine.fmu_process", str(there.fileno()), str(folder)]
         with tempfile.TemporaryFile() as log, here:
-            given: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
-            process = subprocess.Popen(command, pass_fds=[there.fileno()], cwd=folder, **given)
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                pass_fds=[there.fileno()],
+                cwd=folder,
+                env=environment,
+            )
             there.close()
             try:
                 here.send((call, left))

@@ -340,8 +340,8 @@ class SimulatorFmu(SimulatorFunction):
     def _start_of(self, along: Along) -> list[float]:
         """Start values at the beginning of a run, where actuators are at their orders."""
         first = {name: values[:1] for name, values in along.record.items()}
-        orders = {f"{ACTUAL}{name}": values for name, values in first.items()}
-        return list(self._variables("start", orders | first)[0].tolist())
+        reached = {f"{ACTUAL}{name}": values for name, values in first.items()}
+        return list(self._variables("start", reached | first)[0].tolist())
 
     def _variables(self, role: str, signals: Mapping[str, Array]) -> Array:
         """Values (..., n) of the variables of a role; ShipidError where a signal is not there."""
@@ -443,8 +443,11 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
             words = f"no row gives {', '.join(names)}; variables of the FMU for a row of role {role}: {there}"
             raise DocumentError(words, file=file, path="fmu")
     used = {link.reference for some in links.values() for link in some}
-    free = {name: one for name, one in variables.items() if one.causality == "parameter" and one.start is not None}
-    free = {name: one for name, one in free.items() if one.valueReference not in used}
+    free = {
+        name: one
+        for name, one in variables.items()
+        if one.causality == "parameter" and one.start is not None and one.valueReference not in used
+    }
     return Fmu(
         path,
         hashlib.sha256(path.read_bytes() + documents.digest_document(raw).encode()).hexdigest()[:8],

@@ -203,13 +203,21 @@ def count_steps(seconds: float, step: float) -> int:
     return max(round(seconds / step), 1)
 
 
+def last_steps(instants: Instants, steps: int) -> dict[str, Array]:
+    """The past of the last `steps` steps, the oldest first, name -> (steps, S); DataError where it is shorter."""
+    held = len(instants.past.get("u", ()))
+    if held < steps:
+        raise DataError(f"the method needs {steps} steps of the past, there are {held}", path="u")
+    return {name: values[held - steps :] for name, values in instants.past.items()}
+
+
 def earlier_instants(instants: Instants, steps: int, step: float, *, placed: bool = True) -> Instants:
     """Instants so many steps [s] before others, with the orders given since.
 
     placed : whether they have north, east [m] of the ship, too; else its place is the origin.
     """
-    then = {name: values[-steps] for name, values in instants.past.items()}
-    given = {name: values[-steps:] for name, values in instants.past.items() if "." in name}
+    past = last_steps(instants, steps)
+    then, given = {name: values[0] for name, values in past.items()}, {name: past[name] for name in past if "." in name}
     if placed:
         places = from_frame(then["x"], then["y"], *(instants.columns[name] for name in ("north", "east", "psi")))
         then |= dict(zip(("north", "east"), places, strict=True))

@@ -50,11 +50,8 @@ from shipid.vessel.schema import equation_functions
 WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
-METHOD_CODE, TERM_CODE, FUNCTION_CODE = (
-    "code of the method",
-    "code of the term",
-    "code of the function",
-)  # entries of a session: name -> digest
+METHOD_CODE, TERM_CODE, FUNCTION_CODE = "code of the method", "code of the term", "code of the function"
+"""Entries of a session: name -> digest."""
 
 
 @dataclass(frozen=True)
@@ -229,12 +226,12 @@ def own_code(plan: Plan) -> dict[str, dict[str, str]]:
         METHOD_CODE: {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()},
         TERM_CODE: {key: held for one in vessels_of(plan) for key, held in equation_functions(one.document).items()},
     }
-    functions = {key: one for key, one in plan.simulators.items() if isinstance(one, SimulatorFunction)}
     own = {
         what: {name: users_code(held) for name, held in named.items() if any(map(is_user_code, held))}
         for what, named in every.items()
     }
-    own[FUNCTION_CODE] = {key: one.code_digest for key, one in functions.items()}
+    simulators = plan.simulators.items()
+    own[FUNCTION_CODE] = {key: one.code_digest for key, one in simulators if isinstance(one, SimulatorFunction)}
     return {what: digests for what, digests in own.items() if digests}
 
 

@@ -164,18 +164,18 @@ def windows(
     )
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
-    if every:  # the tables that are to be made
-        others = (one for one in plan.foundations if not isinstance(one.base, PredictionTable))
-        plan = replace(plan, foundations=tuple(others))
+    if every:  # without the tables that are to be made
+        plan = replace(
+            plan, foundations=tuple(one for one in plan.foundations if not isinstance(one.base, PredictionTable))
+        )
     grid = plan.study.grid
     amount = max(grid.N_D) if N_D is None else N_D
     check_choice("N_D", str(amount), map(str, grid.N_D))
     seeds = plan.study.seeds_of(amount)
     batch = Batch(amount, seeds[0] if seed is None else seed)
     check_choice("seed", str(batch.seed), map(str, seeds))
-    stored = folder is not None and (folder / store.DATASET).is_file()
-    dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
-    prepared = prepare(plan, dataset, device)
+    stored = place / store.DATASET
+    prepared = prepare(plan, read_dataset(stored) if folder and stored.is_file() else obtain_runs(plan), device)
     runs, known = tuple(prepared.pool.spans) if every else prepared.runs(batch), plan.study.prediction.known
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
     cut = join_windows([hide_future(train, known, True), hide_future(prepared.test, known, with_truth)])
