@@ -24,7 +24,7 @@ from shipid.users import line_in_file
 Member = TypeVar("Member")
 REGISTRIES: dict[str, Registry[Any]] = {}
 """Group of entry points -> the registry that they add to."""
-TRIED: list[Path] = []
+TRIED_FILES: list[Path] = []
 """Files that this process has run by `import_files`, the first one first."""
 
 
@@ -165,7 +165,7 @@ def import_files(files: Iterable[Path]) -> None:
             raise ShipidError("no such file: on a cluster each machine needs it", file=file, path="--with")
         if import_user_module(path.stem, str(path)) is not sys.modules[path.stem]:
             raise ShipidError(f"{path.stem!r} is the name of another module: rename it", file=file, path="--with")
-        TRIED.extend({path} - {*TRIED})
+        TRIED_FILES.extend({path} - {*TRIED_FILES})
 
 
 def added_members() -> list[bytes]:

@@ -123,7 +123,7 @@ class Fmu:
 
 
 @dataclass(frozen=True)
-class Along:
+class RunTrack:
     """A record of a run from its beginning, and the windows that begin in it.
 
     record : states, orders and weather, name -> (N,) [SI], a row for each step of the FMU. windows : places of some of
@@ -165,7 +165,7 @@ class SimulatorFmu(SimulatorFunction):
         """Digest of the FMU and its table as they are now; as when the study was read, where it may not be run."""
         return self.fmu.digest if self.trust else self.digest
 
-    def along(self, dataset: Dataset) -> Self:
+    def with_runs(self, dataset: Dataset) -> Self:
         """Return the FMU with the runs that it may have to go along."""
         return replace(self, runs=dataset)
 
@@ -184,7 +184,7 @@ class SimulatorFmu(SimulatorFunction):
         errors = dict[str, float]()
         for name in ("", *own):  # as it is, and with each order the other way
             turned = {key: -values if key == name else values for key, values in orders.items()}
-            motion, _ = self.simulate(begun, turned | weather, some.step, self._along(given, some.step))
+            motion, _ = self.simulate(begun, turned | weather, some.step, self._tracks_of(given, some.step))
             errors[name] = float(np.hypot(*(motion[:, -1, :2] - goal).T).mean())
         least = min(errors, key=errors.__getitem__)
         if remedy and errors[least] < OTHER_WAY * errors[""]:
@@ -196,7 +196,7 @@ class SimulatorFmu(SimulatorFunction):
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
         """Return the states that the FMU gives, name -> (T, S); no numbers from where it fails on."""
         begun, orders, weather = self.arguments_of(instants, horizon)
-        motion, faults = self.simulate(begun, orders | weather, step, self._along(instants, step))
+        motion, faults = self.simulate(begun, orders | weather, step, self._tracks_of(instants, step))
         if faults:
             log.warning("%s fails in %d of %d runs; the first: %s", self.key, len(faults), len(motion), faults[0])
         return {name: motion[:, 1:, place].T for place, name in enumerate(MEASURED_MOTION)}
@@ -209,7 +209,7 @@ class SimulatorFmu(SimulatorFunction):
         runs = [rows for _, rows in frame.groupby("run", sort=False)]
         columns = {name: values.reshape(len(runs), -1) for name, values in _columns(frame).items()}
         states = np.stack([columns[name][:, 0] for name in MEASURED_MOTION], axis=-1)
-        along = [Along({name: columns[name][place] for name in columns}, [place], [0]) for place in range(len(runs))]
+        along = [RunTrack({name: columns[name][place] for name in columns}, [place], [0]) for place in range(len(runs))]
         ahead = {name: values[:, :-1] for name, values in columns.items() if name not in MEASURED_MOTION}
         motion, faults = self.simulate(states, ahead, float(np.diff(columns["t"][0, :2])[0]), along)
         if faults:
@@ -222,7 +222,7 @@ class SimulatorFmu(SimulatorFunction):
         moved = {name: motion[..., place].ravel() for place, name in enumerate(MEASURED_MOTION)}
         return frame.drop(columns=others).assign(**moved)
 
-    def _along(self, instants: Instants, step: float) -> list[Along]:
+    def _tracks_of(self, instants: Instants, step: float) -> list[RunTrack]:
         """The runs of instants from their beginnings, in steps of the FMU; none where nobody knows them."""
         if self.runs is None or instants.run is None or instants.t is None:
             return []
@@ -236,7 +236,7 @@ class SimulatorFmu(SimulatorFunction):
                 at = np.rint((now[mine] - t[0]) / within).astype(int)
                 held = np.searchsorted(t, t[0] + within * np.arange(max(at[-1], 1)) + slack, side="right") - 1
                 record = {name: values[held] for name, values in _columns(rows).items()}
-                along.append(Along(record, mine.tolist(), at.tolist()))
+                along.append(RunTrack(record, mine.tolist(), at.tolist()))
         return along
 
     def simulate(
@@ -244,7 +244,7 @@ class SimulatorFmu(SimulatorFunction):
         states: Array,
         inputs: Mapping[str, Array],
         step: float,
-        along: Sequence[Along] = (),
+        along: Sequence[RunTrack] = (),
     ) -> tuple[Array, list[str]]:
         """Motion (S, K + 1, 6) after 0..K steps [s], no numbers from where it fails on, and the faults.
 
@@ -301,7 +301,7 @@ class SimulatorFmu(SimulatorFunction):
             {key: np.array([value + changes[one] * (key == one)]) for key, value in inputs.items()} for one in changes
         ]
         ahead = {key: np.stack([one[key] for one in held]).repeat(round(RESPONSE / step), axis=1) for key in inputs}
-        along = [Along(still | one, [place], [0]) for place, one in enumerate(held)]
+        along = [RunTrack(still | one, [place], [0]) for place, one in enumerate(held)]
         motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, along)
         if not np.isfinite(motion).all():
             raise DocumentError(f"the FMU fails in a step response: {'; '.join(faults[:1])}", file=self.file)
@@ -337,7 +337,7 @@ class SimulatorFmu(SimulatorFunction):
             raise DocumentError(words, file=self.file, path="fmu.step")
         return every
 
-    def _start_of(self, along: Along) -> list[float]:
+    def _start_of(self, along: RunTrack) -> list[float]:
         """Start values at the beginning of a run, where actuators are at their orders."""
         first = {name: values[:1] for name, values in along.record.items()}
         reached = {f"{ACTUAL}{name}": values for name, values in first.items()}

@@ -41,7 +41,7 @@ class Simulator(ABC):
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
         """Return north, east [m] and, where it knows them, psi [rad], u, v, r after 1..T steps, name -> (T, S)."""
 
-    def along(self, dataset: Dataset) -> Simulator:
+    def with_runs(self, dataset: Dataset) -> Simulator:
         """Return the simulator with the runs of a study, which it may have to go along from their beginnings."""
         del dataset
         return self

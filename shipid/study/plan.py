@@ -25,7 +25,7 @@ from shipid.foundations.function import SimulatorFunction
 from shipid.hybrid.simulated import Simulator
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
-from shipid.plugins import TRIED
+from shipid.plugins import TRIED_FILES
 from shipid.simulation.families import expand_families
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
@@ -212,7 +212,7 @@ def default_folder(plan: Plan) -> Path:
 
 def program_of(plan: Plan) -> str:
     """The command line that knows methods and terms: `shipid`, with the files that the user tries."""
-    return " ".join(["shipid", *(f"--with {quote_argument(file)}" for file in TRIED if own_code(plan))])
+    return " ".join(["shipid", *(f"--with {quote_argument(file)}" for file in TRIED_FILES if own_code(plan))])
 
 
 def own_code(plan: Plan) -> dict[str, dict[str, str]]:

@@ -269,7 +269,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         notes.append(
             f"runs that move as others do ({copies}): errors and intervals take them for new: leave out copies"
         )
-    plan = replace(plan, foundations=tuple(one.along(dataset) for one in plan.foundations))
+    plan = replace(plan, foundations=tuple(one.with_runs(dataset) for one in plan.foundations))
     looked_at: set[tuple[str, str]] = set()
     for foundation in plan.foundations:
         if isinstance(foundation.base, Vessel):

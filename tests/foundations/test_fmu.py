@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.foundations.fmu import Along, SimulatorFmu
+from shipid.foundations.fmu import RunTrack, SimulatorFmu
 from tests.foundations.foreign import build_ship, motion_of_ship, write_table
 
 STEP, HORIZON, COUNT = 0.5, 20, 6
@@ -76,7 +76,7 @@ def test_a_ship_without_start_values_runs_along_the_run(folder, version, branche
     rows = [0, 5, 17, 30]
     held = {name: np.repeat(values[rows][:, None], HORIZON, axis=1) for name, values in orders.items()}
     known = {name: np.stack([values[row : row + HORIZON] for row in rows]) for name, values in orders.items()}
-    along = [Along({**orders, "psi": motion[:-1, 2]}, range(len(rows)), rows)]
+    along = [RunTrack({**orders, "psi": motion[:-1, 2]}, range(len(rows)), rows)]
     begun = motion[rows]
     for ahead in (held, known):
         found, faults = fmu.simulate(begun, ahead, STEP, along)
