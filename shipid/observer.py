@@ -359,9 +359,8 @@ def _low_rates(model: Dynamics, low: SX, memory: SX, commands: SX, environment: 
         names |= {"V_w": ca.sqrt(ahead**2 + across**2), "beta_w": ca.atan2(across, ahead)}
     names |= {name: SX(0) for name in ("V_c", "beta_c") if name in names}
     through = ca.vertcat(low[:3], low[3] - u_c, low[4] - v_c, r)
-    still = {term.path: ca.DM.zeros(sum(term.widths.values()), 1) for term in model.drawn}
     inputs = [through, memory, commands, ca.vertcat(SX(0, 1), *names.values()), parameters]
-    forced = summed_rates(model, inputs, SX.zeros(3), still)
+    forced = summed_rates(model, inputs, SX.zeros(3), {})
     turning = ca.vertcat(r * v_c, -r * u_c, 0)
     return ca.vertcat(
         c * low[3] - s * low[4], s * low[3] + c * low[4], r, forced[3:6] + turning + low[6:9], SX.zeros(5)

@@ -13,7 +13,9 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache, cached_property
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Self, TypeVar
 
 from shipid.errors import ShipidError
@@ -22,7 +24,7 @@ from shipid.users import line_in_file
 Member = TypeVar("Member")
 REGISTRIES: dict[str, Registry[Any]] = {}
 """Group of entry points -> the registry that they add to."""
-TRIED: list[Path] = []
+TRIED_FILES: list[Path] = []
 """Files that this process has run by `import_files`, the first one first."""
 
 
@@ -98,8 +100,8 @@ class Registry(dict[str, Member]):
 
     def name_of(self, member: Member) -> str | None:
         """Name of a member; None for an object that is none."""
-        looks: tuple[Callable[[], dict[str, Member]], ...] = (lambda: self, self.load_all)
-        return next((name for look in looks for name, one in look().items() if one is member), None)
+        here = [name for name, one in self.items() if one is member]
+        return next(iter(here or [name for name, one in self.load_all().items() if one is member]), None)
 
 
 @cache
@@ -132,6 +134,26 @@ def fault_of_kind(kind: Any, member: object) -> str:
     return "" if isinstance(member, kind) else f"must be a {kind.__name__} of {kind.__module__}, not {member!r}"
 
 
+@cache
+def import_user_module(name: str, file: str = "") -> ModuleType:
+    """A module of a file, which may import its neighbours, or one that Python finds; ShipidError where it raises.
+
+    A file that has the name of another module is run, and does not take its place.
+    """
+    try:
+        sys.path[:0] = [str(Path(file).parent)] if file else []
+        module = import_module(name)
+        if file and Path(getattr(module, "__file__", None) or "").resolve() != Path(file).resolve():
+            spec: Any = spec_from_file_location(name, file)
+            module = module_from_spec(spec)
+            spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # whatever the user wrote
+        remedy = "" if file else f"; write {name}.py beside the document, or install its package"
+        words = f"cannot be imported: {describe_error(error)}{line_in_file(error, file)}{remedy}"
+        raise ShipidError(words, file=file or name) from None
+    return module
+
+
 def import_files(files: Iterable[Path]) -> None:
     """Run files that put members into registries, each as a module of its name; workers then run them, too.
 
@@ -141,15 +163,9 @@ def import_files(files: Iterable[Path]) -> None:
         path = file.resolve()
         if not path.is_file():
             raise ShipidError("no such file: on a cluster each machine needs it", file=file, path="--with")
-        sys.path[:0] = [] if str(path.parent) in sys.path else [str(path.parent)]
-        try:
-            found = getattr(import_module(path.stem), "__file__", None)
-        except (Exception, SystemExit) as error:  # whatever the user wrote
-            words = describe_error(error) + line_in_file(error, str(path))
-            raise ShipidError(words, file=file, path="--with") from None
-        if found is None or Path(found).resolve() != path:
+        if import_user_module(path.stem, str(path)) is not sys.modules[path.stem]:
             raise ShipidError(f"{path.stem!r} is the name of another module: rename it", file=file, path="--with")
-        TRIED.extend({path} - {*TRIED})
+        TRIED_FILES.extend({path} - {*TRIED_FILES})
 
 
 def added_members() -> list[bytes]:

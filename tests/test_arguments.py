@@ -136,7 +136,10 @@ def exported(**given: Any) -> Any:
 
 CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "rollout": (lambda: shipid.rollout(ANY, {}, {}, step=1.0, num_steps=1), "vessel must be a Vessel, as of"),
-    "members": (lambda: shipid.draw_members(shipid.Family(name="f"), ANY), "base must be a Vessel, as of"),
+    "members": (
+        lambda: shipid.draw_members(shipid.Family(name="f"), ANY),
+        "base must be a PerturbedBase, such as a Vessel",
+    ),
     "simulate": (lambda: shipid.simulate_truth(ANY, ANY), "truth must be a Truth, such as"),
     "cut_windows": (lambda: shipid.cut_windows(ANY, horizon=1), "dataset must be a Dataset, as of"),
     "write_dataset": (lambda: shipid.write_dataset(ANY, "x.parquet"), "dataset must be a Dataset, such as"),
@@ -151,7 +154,10 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "standard": (lambda: shipid.define_standard(ANY, "zigzag"), "vessel must be a Vessel, as of"),
     "Physics": (lambda: shipid.Physics(None, 2, 1.0, observer=ANY), "observer must be an Observer, such as"),
     "draw": (lambda: shipid.draw_variant(ANY, 0, ANY), "family must be a Family, such as"),
-    "numbers": (lambda: shipid.draw_members(shipid.Family(name="f"), ANY, numbers=ANY), "base must be a Vessel"),
+    "numbers": (
+        lambda: shipid.draw_members(shipid.Family(name="f"), ANY, numbers=ANY),
+        "base must be a PerturbedBase, such as a Vessel",
+    ),
     "run_identification": (lambda: shipid.run_identification(ANY, ANY, ANY), "settings must be an Identify, such as"),
     "screen": (lambda: next(shipid.screen(ANY, ANY, [], 1)), "plan must be a Plan, as of"),
     "compare": (lambda: shipid.compare(ANY), "name two folders or more"),

@@ -216,7 +216,7 @@ def test_a_package_goes_through_a_whole_study(site: Path, tmp_path: Path, enter:
 
 
 def test_a_file_that_is_tried_is_a_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plugins, "TRIED", [])
+    monkeypatch.setattr(plugins, "TRIED_FILES", [])
     monkeypatch.setattr(sys, "path", [*sys.path])
     file = tmp_path / "tried_here.py"
     file.write_text("from shipid.physics import TERMS, Term\nTERMS['hull.tried'] = Term(abs)\n")
@@ -224,7 +224,7 @@ def test_a_file_that_is_tried_is_a_module(tmp_path: Path, monkeypatch: pytest.Mo
         patch.setitem(TERMS, "hull.tried", TERMS["hull.mmg"])
         import_files([file, file])
         assert TERMS["hull.tried"].function is abs
-    assert [file] == plugins.TRIED
+    assert [file] == plugins.TRIED_FILES
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_a_file_that_is_tried_is_a_module(tmp_path: Path, monkeypatch: pytest.Mo
         (
             "tried_raises.py",
             "\n1 / 0\n",
-            r"tried_raises\.py: --with: ZeroDivisionError: division by zero in .*, line 2$",
+            r"tried_raises\.py: cannot be imported: ZeroDivisionError: division by zero in .*, line 2$",
         ),
         ("tried_ends.py", "import sys\nsys.exit('no')\n", r"SystemExit: no in .*tried_ends\.py, line 2$"),
         ("tried_odd.py", "def f(:\n", r"SyntaxError: .*tried_odd\.py, line 1"),

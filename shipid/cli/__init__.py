@@ -68,10 +68,9 @@ def main() -> None:
 
 
 def _move_to_front(words: list[str]) -> list[str]:
-    """Move every `--with FILE` before the command: it may stand behind it."""
-    places = [place for place, word in enumerate(words) if word == "--with"]
-    moved = [place for first in places for place in (first, first + 1) if place < len(words)]
-    return [*(words[place] for place in moved), *(word for place, word in enumerate(words) if place not in moved)]
+    """Move every `--with FILE` and `--with=FILE` before the command: it may stand behind it."""
+    pairs = zip(["", *words], words, strict=False)
+    return [word for _, word in sorted(pairs, key=lambda pair: not ("--with" in pair or "--with=" in pair[1]))]
 
 
 def print_usage_error(error: Any, _: Any = None) -> None:

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from shipid.engine.casadi import summed_rates
+from shipid.engine.casadi import input_symbols, summed_rates
 from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob
 from shipid.engine.native import (
     C,
@@ -89,12 +89,11 @@ class _AdjointSource(StagedSource):
     def __init__(self, model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> None:
         self.model, self.wanted = model, wanted
         self.tape = record_step(step, method)
-        sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
-        inputs = [SX.sym(name, size) for name, size in zip(INPUTS, (*sizes, len(model.parameters)), strict=True)]
+        inputs = input_symbols(model)
         tau, dt = SX.sym("tau_extra", model.num_dof), SX.sym("dt")
         rates = SX(summed_rates(model, inputs, tau, {}))
         later = SX(model.advance(*inputs, dt))
-        start = sizes[0] + sizes[1]
+        start = inputs[0].numel() + inputs[1].numel()
 
         def function(name: str, result: SX, last: SX, *more: SX) -> ca.Function:
             given = [*inputs, last, *more]

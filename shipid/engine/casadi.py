@@ -11,7 +11,7 @@ import numpy as np
 
 from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, count_threads, integrate_step
 from shipid.interrupts import hold_interrupts
-from shipid.vessel.dynamics import Dynamics, vessel_dynamics
+from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 BLOCK = (
@@ -19,9 +19,18 @@ BLOCK = (
 )
 
 
+def input_symbols(model: Dynamics) -> list[ca.SX]:
+    """State, memory, commands, environment and parameters as symbols."""
+    states = ca.SX.sym("state", len(model.state) + len(model.hidden))
+    return [states, *(ca.SX.sym(name, len(getattr(model, name))) for name in INPUTS[1:])]
+
+
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
-    """d(state)/dt with every sum over components; `drawn` holds (entries, components) by the path of each drawn sum."""
-    for term in model.sums:
+    """d(state)/dt with sums over components; in calm water, without the drawn sums that are not in `drawn`.
+
+    drawn : path of a drawn sum -> (entries, components).
+    """
+    for term in (term for term in model.sums if term.arrays is not None or term.path in drawn):
         entries = drawn[term.path] if term.arrays is None else ca.DM(term.arrays.T)
         columns = [ca.repmat(one, 1, entries.shape[1]) for one in inputs]
         tau = tau + ca.sum2(term.function.map(entries.shape[1])(*columns, entries))

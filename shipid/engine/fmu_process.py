@@ -13,11 +13,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from typing import Any
 
 Rows = list[list[float]]
 MOST_ENDS = 3  # how often an FMU may hang or end its process before its other runs are given up
 TO_LOAD = 60.0  # s that loading an FMU may take
+LOG = 1  # file into which the process of an FMU prints
 LAST_LINE = 200  # characters of what it printed that a fault quotes
 
 
@@ -62,20 +62,26 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     while left and ends < MOST_ENDS:
         (here, there), allowed = Pipe(), TO_LOAD
-        command = [sys.executable, "-P", "-m", "shipid.engine.fmu_process", str(there.fileno()), str(folder)]
+        command = [sys.executable, "-uP", "-m", "shipid.engine.fmu_process", str(there.fileno()), str(folder)]
         with tempfile.TemporaryFile() as log, here:
-            given: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log, "env": environment}
-            process = subprocess.Popen(command, pass_fds=[there.fileno()], cwd=folder, **given)
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                pass_fds=[there.fileno()],
+                cwd=folder,
+                env=environment,
+            )
             there.close()
             try:
                 here.send((call, left))
                 while left and here.poll(allowed):
                     rows, fault = here.recv()
                     if rows is not None:  # else it is loaded now
-                        yield rows, fault + _last_line(log) * bool(fault)
+                        yield rows, fault
                         del left[0]
                     allowed = limit
-                    os.ftruncate(log.fileno(), 0)
                 fault = f"takes longer than {allowed:g} s"
             except (EOFError, OSError):
                 fault = "ends its process"
@@ -83,17 +89,17 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
                 process.kill()
                 process.wait()
             if left:
-                fault += _last_line(log)
+                fault += _last_line(log.fileno())
                 yield [], fault
                 del left[0]
                 ends += 1
     yield from (([], fault) for _ in left)
 
 
-def _last_line(log: Any) -> str:
-    """The last line that the FMU printed, in brackets."""
-    end = os.fstat(log.fileno()).st_size
-    lines = os.pread(log.fileno(), LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").split("\n")
+def _last_line(log: int) -> str:
+    """The last line that the FMU printed into a file, in brackets."""
+    end = os.fstat(log).st_size
+    lines = os.pread(log, LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").split("\n")
     return next((f" ({line.strip()})" for line in reversed(lines) if line.strip()), "")
 
 
@@ -166,13 +172,13 @@ def _serve(connection: Connection, folder: str) -> None:
     connection.send((None, ""))
     for run in runs:
         rows: Rows = []
+        os.ftruncate(LOG, os.lseek(LOG, 0, os.SEEK_SET))
         try:
             if run.start is not None or not fault:  # else what it goes on from has failed
                 fault = ""
                 one.run(run, rows)
         except Exception as error:
-            fault = f"{error} at {one.time:g} s"
-        sys.stdout.flush()
+            fault = f"{error} at {one.time:g} s{_last_line(LOG)}"
         connection.send((rows, fault))
 
 

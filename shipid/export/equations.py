@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
 from casadi import MX, SX
 
-from shipid.engine.casadi import summed_rates
+from shipid.engine.casadi import input_symbols, summed_rates
 from shipid.engine.integrate import Method, integrate_step
 from shipid.physics.grammar import AXES
 from shipid.physics.signals import ACTUAL, SIGNALS, signal_of, signal_row
@@ -97,24 +97,18 @@ class Equations:
         )
 
 
-def _input_symbols(model: Dynamics) -> list[SX]:
-    states = SX.sym("state", len(model.state) + len(model.hidden))
-    return [states, *(SX.sym(name, len(getattr(model, name))) for name in INPUTS[1:])]
-
-
 @lru_cache(maxsize=32)
 def calm_rates(model: Dynamics) -> ca.Function:
     """(state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt, of all vessels of one structure."""
-    inputs, tau = _input_symbols(model), SX.sym("tau_extra", model.num_dof)
-    calm = replace(model, sums=tuple(term for term in model.sums if term.arrays is not None))
+    inputs, tau = input_symbols(model), SX.sym("tau_extra", model.num_dof)
     given = dict(zip((*INPUTS, "tau_extra"), (*inputs, tau), strict=True))
-    return function_by_names("rates", given, {"rates": SX(summed_rates(calm, inputs, tau, {}))}, cse=True)
+    return function_by_names("rates", given, {"rates": SX(summed_rates(model, inputs, tau, {}))}, cse=True)
 
 
 @lru_cache(maxsize=32)
 def memory_advance(model: Dynamics) -> ca.Function:
     """(memory, commands, parameters, dt) -> memory after dt; neither state nor weather moves an actuator."""
-    state, memory, commands, environment, parameters = _input_symbols(model)
+    state, memory, commands, environment, parameters = input_symbols(model)
     dt = SX.sym("dt")
     after = model.advance(0 * state, memory, commands, 0 * environment, parameters, dt)
     inputs = {"memory": memory, "commands": commands, "parameters": parameters, "dt": dt}

@@ -23,11 +23,12 @@ from shipid import document as documents
 from shipid.arguments import whole_steps
 from shipid.checked import CheckedModel, Positive
 from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
-from shipid.data.windows import Instants, Windows, from_frame
+from shipid.data.windows import Instants, Windows, from_frame, to_frame
 from shipid.engine.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
-from shipid.foundations.function import STATES, SimulatorFunction
+from shipid.foundations.function import SimulatorFunction
 from shipid.logs.mapping import UNITS
+from shipid.observer import MEASURED_MOTION
 from shipid.physics.signals import ACTUAL, SIGNALS, is_command, signal_of
 from shipid.units import DEGREE
 
@@ -62,13 +63,11 @@ class FmuRow(BaseModel):
 
 
 class FmuTable(CheckedModel, BaseModel):
-    """`[fmu]`: a file, its step, and a row, or a list of rows, for each signal."""
+    """Keys of `[fmu]` beside its rows: a row, or a list of rows, for each signal."""
 
-    model_config = ConfigDict(extra="forbid")
     file: str
     step: Annotated[Positive | None, Field(description="s of communication; default: that of the prediction")] = None
     limit: Annotated[Positive, Field(description="s that one run may take")] = 60.0
-    rows: dict[str, list[FmuRow]] = {}
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ class Fmu:
 
 
 @dataclass(frozen=True)
-class Along:
+class RunTrack:
     """A record of a run from its beginning, and the windows that begin in it.
 
     record : states, orders and weather, name -> (N,) [SI], a row for each step of the FMU. windows : places of some of
@@ -166,7 +165,7 @@ class SimulatorFmu(SimulatorFunction):
         """Digest of the FMU and its table as they are now; as when the study was read, where it may not be run."""
         return self.fmu.digest if self.trust else self.digest
 
-    def along(self, dataset: Dataset) -> Self:
+    def with_runs(self, dataset: Dataset) -> Self:
         """Return the FMU with the runs that it may have to go along."""
         return replace(self, runs=dataset)
 
@@ -185,7 +184,7 @@ class SimulatorFmu(SimulatorFunction):
         errors = dict[str, float]()
         for name in ("", *own):  # as it is, and with each order the other way
             turned = {key: -values if key == name else values for key, values in orders.items()}
-            motion, _ = self.simulate(begun, turned | weather, some.step, self._along(given, some.step))
+            motion, _ = self.simulate(begun, turned | weather, some.step, self._tracks_of(given, some.step))
             errors[name] = float(np.hypot(*(motion[:, -1, :2] - goal).T).mean())
         least = min(errors, key=errors.__getitem__)
         if remedy and errors[least] < OTHER_WAY * errors[""]:
@@ -197,10 +196,10 @@ class SimulatorFmu(SimulatorFunction):
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
         """Return the states that the FMU gives, name -> (T, S); no numbers from where it fails on."""
         begun, orders, weather = self.arguments_of(instants, horizon)
-        motion, faults = self.simulate(begun, orders | weather, step, self._along(instants, step))
+        motion, faults = self.simulate(begun, orders | weather, step, self._tracks_of(instants, step))
         if faults:
             log.warning("%s fails in %d of %d runs; the first: %s", self.key, len(faults), len(motion), faults[0])
-        return {name: motion[:, 1:, place].T for place, name in enumerate(STATES)}
+        return {name: motion[:, 1:, place].T for place, name in enumerate(MEASURED_MOTION)}
 
     def perform(self, frame: pd.DataFrame) -> pd.DataFrame:
         """The runs of a log with the motion of the FMU by the same orders, from the same start; DataError if it fails.
@@ -209,21 +208,21 @@ class SimulatorFmu(SimulatorFunction):
         """
         runs = [rows for _, rows in frame.groupby("run", sort=False)]
         columns = {name: values.reshape(len(runs), -1) for name, values in _columns(frame).items()}
-        states = np.stack([columns[name][:, 0] for name in STATES], axis=-1)
-        along = [Along({name: columns[name][place] for name in columns}, [place], [0]) for place in range(len(runs))]
-        ahead = {name: values[:, :-1] for name, values in columns.items() if name not in STATES}
+        states = np.stack([columns[name][:, 0] for name in MEASURED_MOTION], axis=-1)
+        along = [RunTrack({name: columns[name][place] for name in columns}, [place], [0]) for place in range(len(runs))]
+        ahead = {name: values[:, :-1] for name, values in columns.items() if name not in MEASURED_MOTION}
         motion, faults = self.simulate(states, ahead, float(np.diff(columns["t"][0, :2])[0]), along)
         if faults:
             raise DataError(f"the FMU fails: {faults[0]}", file=self.file)
         others = [
             name
             for name in map(str, frame)
-            if name in SIGNALS and SIGNALS[name].role == "motion" and name not in STATES
+            if name in SIGNALS and SIGNALS[name].role == "motion" and name not in MEASURED_MOTION
         ]
-        moved = {name: motion[..., place].ravel() for place, name in enumerate(STATES)}
+        moved = {name: motion[..., place].ravel() for place, name in enumerate(MEASURED_MOTION)}
         return frame.drop(columns=others).assign(**moved)
 
-    def _along(self, instants: Instants, step: float) -> list[Along]:
+    def _tracks_of(self, instants: Instants, step: float) -> list[RunTrack]:
         """The runs of instants from their beginnings, in steps of the FMU; none where nobody knows them."""
         if self.runs is None or instants.run is None or instants.t is None:
             return []
@@ -237,7 +236,7 @@ class SimulatorFmu(SimulatorFunction):
                 at = np.rint((now[mine] - t[0]) / within).astype(int)
                 held = np.searchsorted(t, t[0] + within * np.arange(max(at[-1], 1)) + slack, side="right") - 1
                 record = {name: values[held] for name, values in _columns(rows).items()}
-                along.append(Along(record, mine.tolist(), at.tolist()))
+                along.append(RunTrack(record, mine.tolist(), at.tolist()))
         return along
 
     def simulate(
@@ -245,7 +244,7 @@ class SimulatorFmu(SimulatorFunction):
         states: Array,
         inputs: Mapping[str, Array],
         step: float,
-        along: Sequence[Along] = (),
+        along: Sequence[RunTrack] = (),
     ) -> tuple[Array, list[str]]:
         """Motion (S, K + 1, 6) after 0..K steps [s], no numbers from where it fails on, and the faults.
 
@@ -256,7 +255,7 @@ class SimulatorFmu(SimulatorFunction):
         states : (S, 6) north, east [m], psi [rad], u, v [m/s], r [rad/s]. inputs : orders and weather, name -> (S, K)
             [SI]. along : the runs of the windows; without them actuators begin at their orders.
         """
-        begun, every = dict(zip(STATES, np.asarray(states, float).T, strict=True)), self.steps_within(step)
+        begun, every = dict(zip(MEASURED_MOTION, np.asarray(states, float).T, strict=True)), self.steps_within(step)
         given = self._variables("input", {"psi": begun["psi"][:, None], **inputs}).repeat(every, axis=1).tolist()
         names = {link.signal for link in self.fmu.links["start"]}
         reached = {name for name in names if name.startswith(ACTUAL)}
@@ -283,8 +282,8 @@ class SimulatorFmu(SimulatorFunction):
                     runs.append(FmuRun(start, record[last or 0 : row], given[place], self.fmu.branches))
                     last = row if self.fmu.branches else None
         found, faults = self._signals(runs, step / every, every)
-        motion = np.full((len(given), len(given[0]) // every + 1, len(STATES)), np.nan)
-        motion[list(order)] = [np.stack([one[name] for name in STATES], axis=-1) for one in found]
+        motion = np.full((len(given), len(given[0]) // every + 1, len(MEASURED_MOTION)), np.nan)
+        motion[list(order)] = [np.stack([one[name] for name in MEASURED_MOTION], axis=-1) for one in found]
         turned = not (self.fmu.startable and "psi" in names)
         return _move_motion(motion, states, turned or not {"north", "east"} <= names, turned), faults
 
@@ -294,12 +293,15 @@ class SimulatorFmu(SimulatorFunction):
         state : (6,) at the start. inputs, changes : name -> value, and how much more it is from the start on [SI].
         DocumentError where heading and place do not follow from r, u and v: a wrong sign, unit or frame.
         """
-        step, still = self.fmu.table.step or RESPONSE / 200, dict(zip(STATES, np.reshape(state, (6, 1)), strict=True))
+        step, still = (
+            self.fmu.table.step or RESPONSE / 200,
+            dict(zip(MEASURED_MOTION, np.reshape(state, (6, 1)), strict=True)),
+        )
         held = [
             {key: np.array([value + changes[one] * (key == one)]) for key, value in inputs.items()} for one in changes
         ]
         ahead = {key: np.stack([one[key] for one in held]).repeat(round(RESPONSE / step), axis=1) for key in inputs}
-        along = [Along(still | one, [place], [0]) for place, one in enumerate(held)]
+        along = [RunTrack(still | one, [place], [0]) for place, one in enumerate(held)]
         motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, along)
         if not np.isfinite(motion).all():
             raise DocumentError(f"the FMU fails in a step response: {'; '.join(faults[:1])}", file=self.file)
@@ -315,9 +317,9 @@ class SimulatorFmu(SimulatorFunction):
         """Raise DocumentError where changes of heading and place are not the integrals of r, u and v."""
         north, east, psi, u, v, r = np.moveaxis(motion, -1, 0)
         middle, *rates = [(one[:, 1:] + one[:, :-1]) / 2 for one in (psi, r, u, v)]
-        along = np.diff(north + 1j * east) * np.exp(-1j * middle)
+        along, across = to_frame(np.diff(north), np.diff(east), 0.0, 0.0, middle)
         fastest = np.hypot(*rates[1:]).max()
-        for name, change, rate in zip("ruv", (np.diff(psi), along.real, along.imag), rates, strict=True):
+        for name, change, rate in zip("ruv", (np.diff(psi), along, across), rates, strict=True):
             size = float((rate**2).sum())
             slope = float((change * rate).sum()) / (step * size) if size else 1.0
             if abs(slope - 1) > SLOPE and (name != "v" or np.sqrt(size) > SLOPE * fastest):
@@ -335,11 +337,11 @@ class SimulatorFmu(SimulatorFunction):
             raise DocumentError(words, file=self.file, path="fmu.step")
         return every
 
-    def _start_of(self, along: Along) -> list[float]:
+    def _start_of(self, along: RunTrack) -> list[float]:
         """Start values at the beginning of a run, where actuators are at their orders."""
         first = {name: values[:1] for name, values in along.record.items()}
-        orders = {f"{ACTUAL}{name}": values for name, values in first.items()}
-        return list(self._variables("start", orders | first)[0].tolist())
+        reached = {f"{ACTUAL}{name}": values for name, values in first.items()}
+        return list(self._variables("start", reached | first)[0].tolist())
 
     def _variables(self, role: str, signals: Mapping[str, Array]) -> Array:
         """Values (..., n) of the variables of a role; ShipidError where a signal is not there."""
@@ -350,8 +352,8 @@ class SimulatorFmu(SimulatorFunction):
             )
         values = dict(signals)
         if any(link.over_ground for link in links):
-            over = (signals["u"] + 1j * signals["v"]) * np.exp(1j * signals["psi"])
-            values |= {"ned u": over.real, "ned v": over.imag, "enu u": over.imag, "enu v": over.real}
+            north, east = from_frame(signals["u"], signals["v"], 0.0, 0.0, signals["psi"])
+            values |= {"ned u": north, "ned v": east, "enu u": east, "enu v": north}
         keys = [f"{link.row.frame} {link.signal}" if link.over_ground else link.signal for link in links]
         found = [link.to_variable(values[key]) for key, link in zip(keys, links, strict=True)]
         return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.empty((*np.shape(signals["psi"]), 0))
@@ -375,9 +377,8 @@ class SimulatorFmu(SimulatorFunction):
                 values["psi"] = np.unwrap(values["psi"])
                 frames = {link.row.frame for link in links if link.over_ground}
                 if frames:
-                    over = values["u"] + 1j * values["v"] if frames == {"ned"} else values["v"] + 1j * values["u"]
-                    ahead = over * np.exp(-1j * values["psi"])
-                    values |= {"u": ahead.real, "v": ahead.imag}
+                    north, east = (values[name] for name in ("uv" if frames == {"ned"} else "vu"))
+                    values |= dict(zip("uv", to_frame(north, east, 0.0, 0.0, values["psi"]), strict=True))
                 found.append(values)
                 faults += [fault] if fault else []
         return found, faults
@@ -393,9 +394,8 @@ def _move_motion(motion: Array, states: Array, moved: bool, turned: bool) -> Arr
     motion, goal = motion.copy(), np.asarray(states, float)
     turn = goal[:, 2:3] - motion[:, :1, 2] if turned else 0.0 * goal[:, 2:3]
     if moved:
-        way = motion[..., 0] + 1j * motion[..., 1]
-        way = (way - way[:, :1]) * np.exp(1j * turn) + (goal[:, :1] + 1j * goal[:, 1:2])
-        motion[..., 0], motion[..., 1] = way.real, way.imag
+        x, y = to_frame(motion[..., 0], motion[..., 1], motion[:, :1, 0], motion[:, :1, 1], -turn)
+        motion[..., 0], motion[..., 1] = x + goal[:, :1], y + goal[:, 1:2]
     motion[..., 2] += turn
     return motion
 
@@ -409,35 +409,48 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
     raw = {"file": file.name} if file.suffix == ".fmu" else documents.read_document(file).get("fmu")
     if not isinstance(raw, dict):
         raise DocumentError("has no table [fmu]: give file, step, and a row for each signal", file=file)
-    own = {key: raw[key] for key in FmuTable.model_fields.keys() - {"rows"} if key in raw}
-    rows = {key: row if isinstance(row, list) else [row] for key, row in raw.items() if key not in own}
-    table: FmuTable = documents.parse_model(FmuTable, own | {"rows": rows}, file, "fmu")
+    own = {key: raw[key] for key in FmuTable.model_fields if key in raw}
+    table: FmuTable = documents.parse_model(FmuTable, own, file, "fmu")
+    rows: dict[str, list[FmuRow]] = {
+        signal: [
+            documents.parse_model(FmuRow, row, file, f"fmu.{signal}")
+            for row in (its if isinstance(its, list) else [its])
+        ]
+        for signal, its in raw.items()
+        if signal not in own
+    }
     path = documents.find_document(Path(table.file), "models", file.parent)
     description = _read_description(path)
     variables = {
         one.name: one for one in description.modelVariables if one.type in ("Real", "Float64") and not one.dimensions
     }
     for one in variables.values():  # by its name, where no row says else
-        if one.causality in ("input", "output") and _is_signal(one.name) and one.name not in table.rows:
-            table.rows[one.name] = [FmuRow(variable=one.name)]
+        if one.causality in ("input", "output") and _is_signal(one.name):
+            rows.setdefault(one.name, [FmuRow(variable=one.name)])
     links: dict[str, list[Link]] = {role: [] for role in ROLES}
-    for signal, its in table.rows.items():
+    for signal, its in rows.items():
         for row in its:
             for role, link in _links_of_row(signal, row, variables, file):
                 links[role].append(link)
     have = {link.signal for link in links["output"]}
-    missing = {"output": [name for name in STATES if name not in have], "input": [] if links["input"] else ["orders"]}
+    missing: dict[str, list[str]] = {
+        "output": [name for name in MEASURED_MOTION if name not in have],
+        "input": [] if links["input"] else ["orders"],
+    }
     for role, names in missing.items():
         if names:
             there = ", ".join(one.name for one in variables.values() if one.causality in ROLES[role]) or "none"
             words = f"no row gives {', '.join(names)}; variables of the FMU for a row of role {role}: {there}"
             raise DocumentError(words, file=file, path="fmu")
     used = {link.reference for some in links.values() for link in some}
-    free = {name: one for name, one in variables.items() if one.causality == "parameter" and one.start is not None}
-    free = {name: one for name, one in free.items() if one.valueReference not in used}
+    free = {
+        name: one
+        for name, one in variables.items()
+        if one.causality == "parameter" and one.start is not None and one.valueReference not in used
+    }
     return Fmu(
         path,
-        hashlib.sha256(path.read_bytes() + table.model_dump_json().encode()).hexdigest()[:8],
+        hashlib.sha256(path.read_bytes() + documents.digest_document(raw).encode()).hexdigest()[:8],
         table,
         links | {"start": links["start"] + links["parameter"]},
         {name: float(one.start) for name, one in free.items()},
@@ -468,7 +481,7 @@ def _read_description(path: Path) -> Any:
 def _is_signal(name: str) -> bool:
     """Whether a name is that of a state, an order or the weather."""
     return (
-        name in STATES
+        name in MEASURED_MOTION
         or is_command(name.removeprefix(ACTUAL))
         or (name in SIGNALS and SIGNALS[name].role == "environment")
     )
@@ -478,7 +491,7 @@ def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: 
     """Role and link of a row; of an output that may be set before the start, too, two."""
     path = f"fmu.{signal}"
     if not _is_signal(signal):
-        words = f"no signal: give {', '.join(STATES)}, an order such as rudder.delta, or wind such as V_w"
+        words = f"no signal: give {', '.join(MEASURED_MOTION)}, an order such as rudder.delta, or wind such as V_w"
         raise DocumentError(words, file=file, path=path)
     if row.variable not in variables:
         words = f"no real variable {row.variable!r}: {suggest_name(row.variable, variables)}"
@@ -486,7 +499,7 @@ def _links_of_row(signal: str, row: FmuRow, variables: Mapping[str, Any], file: 
     variable = variables[row.variable]
     roles = [role for role, kinds in ROLES.items() if variable.causality in kinds]
     role: Any = row.role or next(iter(roles), None)
-    if role not in roles or role == ("input" if signal in STATES or signal.startswith(ACTUAL) else "output"):
+    if role not in roles or role == ("input" if signal in MEASURED_MOTION or signal.startswith(ACTUAL) else "output"):
         words = f"{row.variable!r} has the causality {variable.causality}, no {role or 'variable'} of {signal}"
         raise DocumentError(words, file=file, path=f"{path}.role")
     si = SIGNALS[signal_of(signal)].unit

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import inspect
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
@@ -20,14 +16,14 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
+from shipid.observer import MEASURED_MOTION
 from shipid.physics.signals import measurable_signals
-from shipid.plugins import Registry, fault_of_kind
+from shipid.plugins import Registry, fault_of_kind, import_user_module
 from shipid.users import locate_errors, users_code
 
 SimulateFunction = Callable[..., Any]
 FUNCTIONS: Registry[SimulateFunction] = Registry("shipid.foundations", partial(fault_of_kind, Callable))
 """Name, as after `function = ` in a document -> function, of Python or an installed package: it needs no trust."""
-STATES = ("north", "east", "psi", "u", "v", "r")
 ARGUMENTS = ("states", "orders", "weather", "step")
 BATCH = 1000  # instants of a call: 300 steps of 20 columns are 48 MB
 
@@ -88,7 +84,7 @@ class SimulatorFunction(NamedSimulator):
             raise DocumentError(f"{words}: {suggest_name(self.key, FUNCTIONS.names)}")
         self.require_trust()
         module, _, name = self.key.partition(":")
-        found = getattr(held := import_users_module(module, self.file), name, None)
+        found = getattr(held := import_user_module(module, self.file), name, None)
         if not callable(found):
             raise DocumentError(f"{self.key!r}: {module} has no function {name!r}: {suggest_name(name, vars(held))}")
         return cast(SimulateFunction, found)
@@ -111,7 +107,7 @@ class SimulatorFunction(NamedSimulator):
     def arguments_of(self, instants: Instants, horizon: int) -> tuple[Array, dict[str, Array], dict[str, Array]]:
         """States (S, 6), orders and weather, name -> (S, K), of instants."""
         columns, zero = instants.columns, np.zeros(len(instants))
-        begun = np.stack([np.asarray(columns.get(name, zero), float) for name in STATES], axis=-1)
+        begun = np.stack([np.asarray(columns.get(name, zero), float) for name in MEASURED_MOTION], axis=-1)
         held = {name: values for name, values in columns.items() if "." in name}
         orders = {name: np.tile(values[:, None], horizon) for name, values in held.items()}
         orders |= {name: np.asarray(values)[:horizon].T for name, values in (instants.planned or {}).items()}
@@ -127,10 +123,12 @@ class SimulatorFunction(NamedSimulator):
             with locate_errors(self.key, self.function, "function"):
                 given = self.function(begun[some], *tables, step, **self.parameters)
             parts.append(as_float_array(f"states of {self.key}", given, DataError))
-            if parts[-1].shape != (wanted := (len(begun[some]), horizon, len(STATES))):
-                raise DataError(f"{self.key} must give states {wanted}, {', '.join(STATES)}, not {parts[-1].shape}")
-        every = np.concatenate(parts) if parts else np.empty((0, horizon, len(STATES)))
-        return {name: every[..., place].T for place, name in enumerate(STATES)}
+            if parts[-1].shape != (wanted := (len(begun[some]), horizon, len(MEASURED_MOTION))):
+                raise DataError(
+                    f"{self.key} must give states {wanted}, {', '.join(MEASURED_MOTION)}, not {parts[-1].shape}"
+                )
+        every = np.concatenate(parts) if parts else np.empty((0, horizon, len(MEASURED_MOTION)))
+        return {name: every[..., place].T for place, name in enumerate(MEASURED_MOTION)}
 
 
 def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:
@@ -147,26 +145,3 @@ def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:
         for name, value in values.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
     }
-
-
-@cache
-def import_users_module(name: str, file: str) -> ModuleType:
-    """A module of a file, which may import its neighbours, or one that Python finds; DocumentError where it fails."""
-    folder = str(Path(file).parent) if file else ""
-    try:
-        if not file:
-            return importlib.import_module(name)
-        spec = importlib.util.spec_from_file_location(name, file)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.path.insert(0, folder)
-        try:
-            sys.modules.setdefault(name, module)  # not in place of another one, such as of another study
-            spec.loader.exec_module(module)
-        finally:
-            sys.path.remove(folder)
-        return module
-    except (Exception, SystemExit) as error:
-        where = f" in {file}" if file else ""
-        raise DocumentError(f"{name}{where} cannot be imported ({type(error).__name__}: {error})") from None

@@ -15,13 +15,12 @@ from shipid.arguments import as_names
 from shipid.data.windows import Instants, Windows, from_frame
 from shipid.errors import DataError, DocumentError, ResultError
 from shipid.foundations.faults import PLACES, doubt_of_places
-from shipid.foundations.function import STATES
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
 from shipid.logs.importing import file_digest
+from shipid.observer import MEASURED_MOTION
 
 KEYS = ["run", "instant", "ahead"]
-MOTION_COLUMNS = STATES[2:]  # of a table that holds the motion, too
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class PredictionTable(NamedSimulator):
                 tables.append(cls(name, "", str((folder / name).absolute()), ("path", "motion")))
                 continue
             columns = read_prediction_frame(file).columns
-            gives: tuple[Needs, ...] = ("path", "motion") if {*MOTION_COLUMNS} <= {*columns} else ("path",)
+            gives: tuple[Needs, ...] = ("path", "motion") if {*MEASURED_MOTION} <= {*columns} else ("path",)
             tables.append(cls(name, file_digest(file), str(file.absolute()), gives))
         return tables
 
@@ -81,7 +80,7 @@ class PredictionTable(NamedSimulator):
         """Return what the table says of these instants; DataError where it lacks one."""
         if instants.run is None or instants.t is None:
             raise DataError("nobody knows the runs of these instants: give the paths of the physics", file=self.file)
-        names = [name for name in STATES if name in self.frame]
+        names = [name for name in MEASURED_MOTION if name in self.frame]
         keys = prediction_keys(instants.run, instants.t, step * np.arange(1, horizon + 1))
         values = ordered_values(self.frame, keys, names, Path(self.file))
         return {name: values[:, place].reshape(-1, horizon).T for place, name in enumerate(names)}
@@ -108,7 +107,7 @@ def read_prediction_frame(file: Path) -> pd.DataFrame:
     for name in (*KEYS, *PLACES):
         if name not in frame:
             raise DataError(f"lacks this column; it has {', '.join(map(str, frame))}", file=file, path=name)
-    for name in [*KEYS[1:], *(name for name in STATES if name in frame)]:
+    for name in [*KEYS[1:], *(name for name in MEASURED_MOTION if name in frame)]:
         given, frame[name] = frame[name], pd.to_numeric(frame[name], errors="coerce").astype(float)
         if (bad := np.flatnonzero(~np.isfinite(frame[name]))).size:
             fault = f"{given.iloc[bad[0]]} in row {bad[0]} is no number; {len(bad)} of {len(frame)} rows have none"
@@ -134,10 +133,7 @@ def study_keys(parts: Sequence[Windows], before: Collection[int]) -> pd.MultiInd
         steps = cut.step * np.arange(1, max(cut.horizon, *before, 0) + 1)
         wanted.append(prediction_keys(cut.run, cut.t, steps[: cut.horizon]))
         wanted += [prediction_keys(cut.run, cut.t - count * cut.step, steps[:count]) for count in before]
-    keys = wanted[0]
-    for more in wanted[1:]:
-        keys = keys.append(more)
-    return keys.drop_duplicates()
+    return wanted[0].append(wanted[1:]).drop_duplicates()
 
 
 def check_keys(frame: pd.DataFrame, wanted: pd.MultiIndex, file: Path, option: str = "") -> None:

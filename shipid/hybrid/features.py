@@ -192,9 +192,9 @@ def observer_inputs(instants: Instants) -> dict[str, Array]:
     """
     known, columns = instants.estimates, instants.columns
     table = {f"observer-force.{motion}": known[f"observer.{name}"] for motion, name in zip(MOTIONS, "XYN", strict=True)}
-    c, s = np.cos(columns["psi"]), np.sin(columns["psi"])
-    north, east = known["observer.current_north"], known["observer.current_east"]
-    table |= {"observer-current.u": c * north + s * east, "observer-current.v": c * east - s * north}
+    north, east = (known[f"observer.current_{axis}"] for axis in ("north", "east"))
+    through = to_frame(north, east, 0.0, 0.0, columns["psi"])
+    table |= dict(zip(("observer-current.u", "observer-current.v"), through, strict=True))
     return table | {f"observer-wave.{name}": columns[name] - known[f"observer.{name}"] for name in MOTIONS}
 
 
@@ -203,28 +203,42 @@ def count_steps(seconds: float, step: float) -> int:
     return max(round(seconds / step), 1)
 
 
+def last_steps(instants: Instants, steps: int) -> dict[str, Array]:
+    """The past of the last `steps` steps, the oldest first, name -> (steps, S); DataError where it is shorter."""
+    held = len(instants.past.get("u", ()))
+    if held < steps:
+        raise DataError(f"the method needs {steps} steps of the past, there are {held}", path="u")
+    return {name: values[held - steps :] for name, values in instants.past.items()}
+
+
+def earlier_instants(instants: Instants, steps: int, step: float, *, placed: bool = True) -> Instants:
+    """Instants so many steps [s] before others, with the orders given since.
+
+    placed : whether they have north, east [m] of the ship, too; else its place is the origin.
+    """
+    past = last_steps(instants, steps)
+    then, given = {name: values[0] for name, values in past.items()}, {name: past[name] for name in past if "." in name}
+    if placed:
+        places = from_frame(then["x"], then["y"], *(instants.columns[name] for name in ("north", "east", "psi")))
+        then |= dict(zip(("north", "east"), places, strict=True))
+    return Instants(then, planned=given, run=instants.run, t=None if instants.t is None else instants.t - steps * step)
+
+
 def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str, Array]:
     """Errors (S,) at the instants of a prediction by the physics from `seconds` before, with the commands given since.
 
     x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
     velocities [m/s, rad/s], where the physics says them. A prediction that diverged gives zeros.
     """
-    steps = count_steps(seconds, physics.step)
-    past, columns = instants.past, instants.columns
+    steps, columns = count_steps(seconds, physics.step), instants.columns
     value_before(instants, "x", seconds, physics.step)
-    then = {name: values[-steps] for name, values in past.items()}
-    given = {name: values[-steps:] for name, values in past.items() if "." in name}
-    if physics.vessel is None:  # a simulator is asked where the ship was
-        places = from_frame(then["x"], then["y"], *(columns[name] for name in ("north", "east", "psi")))
-        then |= dict(zip(("north", "east"), places, strict=True))
-    before, t = replace(physics, horizon=steps), None if instants.t is None else instants.t - steps * physics.step
-    begun = Instants(then, planned=given, run=instants.run, t=t)
+    begun = earlier_instants(instants, steps, physics.step, placed=physics.vessel is None)  # as a simulator asks
+    then, before = begun.columns, replace(physics, horizon=steps)
     ends = {name: values[-1] for name, values in before.states(begun).items()}
     turned = columns["psi"] - then["psi"]
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
     dx, dy = x0 - ends["x"], y0 - ends["y"]
-    c, s = np.cos(turned), np.sin(turned)
-    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
+    errors = dict(zip("xy", to_frame(dx, dy, 0.0, 0.0, turned), strict=True))
     errors |= {name: columns[name] - ends[name] for name in MOTIONS if name in ends}
     sound = (np.abs(np.stack([*errors.values()])) < np.inf).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}

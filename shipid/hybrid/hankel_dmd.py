@@ -16,9 +16,8 @@ from pydantic import Field, PositiveFloat
 from pydantic import model_validator as validator
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import MOTIONS, count_steps, feature_table
+from shipid.hybrid.features import MOTIONS, count_steps, earlier_instants, feature_table, last_steps
 from shipid.hybrid.method import Array, Index
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale
@@ -84,15 +83,11 @@ def missed_steps(physics: Physics, instants: Instants, motion: Mapping[str, Arra
 
 def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple[str, ...]) -> dict[str, Array]:
     """Velocities, commands and what the physics missed over the last steps before the instants, (P, S) by name."""
-    held = len(instants.past.get("u", ()))
-    if held < delays:
-        raise DataError(f"the method needs {delays} steps of the past, there are {held}", path="u")
-    past = {name: values[held - delays :] for name, values in instants.past.items()}
+    past = last_steps(instants, delays)
     rows = {name: past[name] for name in (*MOTIONS, *commands)}
     if physics.absent:
         return rows
-    given = {name: values for name, values in past.items() if "." in name}
-    then = Instants({name: values[0] for name, values in past.items()}, planned=given)
+    then = earlier_instants(instants, delays, physics.step, placed=False)
     motion = {name: np.concatenate([past[name], np.stack([instants.columns[name]])]) for name in (*MOTIONS, "psi")}
     return rows | missed_steps(replace(physics, horizon=delays), then, motion)
 

@@ -16,9 +16,8 @@ import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser, flatten_paths, mean_paths, weigh_shapes
-from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
+from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table, last_steps
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import (
@@ -64,10 +63,8 @@ class SequenceReader(StoredData):
 
 def past_signals(instants: Instants, steps: int, commands: tuple[str, ...]) -> list[dict[str, Array]]:
     """Motion, commands and relative wind (S,) at the last `steps` steps and at the instant, the oldest first."""
-    held = len(instants.past.get("u", ()))
-    if held < steps:
-        raise DataError(f"the method needs {steps} steps of the past, there are {held}", path="u")
-    before = [{name: values[k] for name, values in instants.past.items()} for k in range(held - steps, held)]
+    past = last_steps(instants, steps)
+    before = [{name: values[k] for name, values in past.items()} for k in range(steps)]
     return [feature_table(columns, commands) for columns in (*before, instants.columns)]
 
 

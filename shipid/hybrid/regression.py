@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.optimize import least_squares
 
-from shipid.data.windows import Instants, choose_evenly
+from shipid.data.windows import Instants, choose_evenly, to_frame
 from shipid.hybrid.features import MOTIONS, feature_table
 from shipid.hybrid.method import Array, FitResult, Index, Method, Task
 from shipid.hybrid.physics import Needs, Physics
@@ -57,9 +57,7 @@ def law_terms(table: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
 
 def water_velocity(current: Array, psi: Array) -> Array:
     """Velocity (S, 3) of the water, current (S, 2) north and east [m/s], in axes of the ship at headings (S,)."""
-    c, s = np.cos(psi), np.sin(psi)
-    north, east = current.T
-    return np.stack([c * north + s * east, c * east - s * north, np.zeros_like(c)], axis=1)
+    return np.stack([*to_frame(current[:, 0], current[:, 1], 0.0, 0.0, psi), np.zeros_like(psi)], axis=1)
 
 
 def through_water(table: Mapping[str, Array], water: Array) -> dict[str, Array]:

@@ -27,7 +27,7 @@ class Simulator(ABC):
 
     key : its name in a document. file : of its code or paths; may be empty. digest : of all that its paths depend on.
     parameters : numbers that families change.
-    gives : what a method may ask of it, see `Needs`.
+    gives : what a method may ask of it, see `Needs`. kind : key of a family that names it.
     """
 
     key: str
@@ -35,12 +35,13 @@ class Simulator(ABC):
     digest: str
     parameters: Mapping[str, float]
     gives: tuple[Needs, ...]
+    kind: ClassVar[str] = ""
 
     @abstractmethod
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
         """Return north, east [m] and, where it knows them, psi [rad], u, v, r after 1..T steps, name -> (T, S)."""
 
-    def along(self, dataset: Dataset) -> Simulator:
+    def with_runs(self, dataset: Dataset) -> Simulator:
         """Return the simulator with the runs of a study, which it may have to go along from their beginnings."""
         del dataset
         return self
@@ -133,16 +134,12 @@ REMEDY = "take a method that works on the path, such as kernel or path-drawn"
 class SimulatorRecord(Simulator):
     """What a saved predictor knows of its simulator: neither its code nor its paths."""
 
+    key: str
     known: Mapping[str, Any]
     file: str = ""
     digest: str = ""
     gives: tuple[Needs, ...] = ("path",)
     parameters: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def key(self) -> str:  # type: ignore[override]
-        """Name of the simulator in the study."""
-        return str(self.known["key"])
 
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:  # noqa: ARG002
         """It has none: ShipidError."""
@@ -164,5 +161,6 @@ def physics_entry(physics: Physics) -> dict[str, Any] | None:
 def physics_of_entry(entry: Mapping[str, Any] | None, **rule: Any) -> Physics:
     """The physics of `physics_entry`; rule : horizon, step and more of `Physics`."""
     if entry is not None and "simulator" in entry:
-        return SimulatedPhysics(None, **rule, simulator=SimulatorRecord(entry["simulator"]))
+        known = entry["simulator"]
+        return SimulatedPhysics(None, **rule, simulator=SimulatorRecord(known["key"], known))
     return Physics(None if entry is None else check_document(entry["document"], entry["file"]), **rule)

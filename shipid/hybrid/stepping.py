@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import PositiveInt
 
-from shipid.data.windows import Instants, Windows
+from shipid.data.windows import Instants, Windows, from_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
@@ -117,8 +117,7 @@ def stepped_paths(
 
 def _rotate_velocity(nu: Array, angle: Array) -> Array:
     """Velocity over ground (S, 2) in axes from which the ship has turned by an angle (S,)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1]], axis=1)
+    return np.stack(from_frame(nu[:, 0], nu[:, 1], 0.0, 0.0, angle), axis=1)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ from scipy.special import exprel
 
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
-from shipid.engine.casadi import memory_along
+from shipid.engine.casadi import input_symbols, memory_along, summed_rates
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes
@@ -507,17 +507,10 @@ def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
 @lru_cache(maxsize=16)
 def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
     """(state, memory, commands, environment, parameters) -> accelerations of u, v, r, at `count` instants."""
-    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
-    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
-    parameters, total = ca.SX.sym("parameters", len(model.parameters)), ca.SX(model.num_dof, 1)
-    for term in model.sums:
-        for entry in () if term.arrays is None else term.arrays:
-            total = total + term.function(*inputs, parameters, entry)
-    rates = model.rates(*inputs, parameters, total)
+    inputs = input_symbols(model)
+    rates = ca.SX(summed_rates(model, inputs, ca.SX.zeros(model.num_dof), {}))
     rows = [model.state.index(name) for name in ("u", "v", "r")]
-    return ca.Function("accelerations", [*inputs, parameters], [rates[rows]], {"cse": True}).map(
-        "mapped", "serial", count, [4], []
-    )
+    return ca.Function("accelerations", inputs, [rates[rows]], {"cse": True}).map("mapped", "serial", count, [4], [])
 
 
 def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:

@@ -15,11 +15,11 @@ from shipid.errors import DataError
 from shipid.identification.residuals import CURRENT
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment, cut_segments
 from shipid.identification.settings import ENVIRONMENT, Identify, resolve_overrides, run_overrides
+from shipid.observer import MEASURED_MOTION
 from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-CHANNELS = ("north", "east", "psi", "u", "v", "r")
 ERRORS_OF = ("u", "v", "r", "position")  # what free runs are judged by
 MOST_STEPS = 1e7  # of all runs together
 MEASURED, ALL = "measured", "all"
@@ -99,7 +99,7 @@ def simulate_free_runs(
             sea, dataset, runs, settings.step, length, overrides=overrides, commands=settings.commands
         )
         if not frames:
-            log = [np.array([_log_column(piece, channel) for channel in CHANNELS]).T for piece in pieces]
+            log = [np.array([_log_column(piece, channel) for channel in MEASURED_MOTION]).T for piece in pieces]
             frames = [_state_series(runs, pieces, MEASURED, log)]
         frames.append(_state_series(runs, pieces, name, _predict_pieces(sea, runs, pieces, overrides, settings)))
     series = pd.concat(frames, ignore_index=True)
@@ -135,7 +135,7 @@ def _predict_alike(
         return np.array([_log_column(piece, name)[row] for piece, row in zip(pieces, rows, strict=True)]).T
 
     start = {name: np.array([_log_column(one, name)[0] for one in pieces]) for name in (*model.state, *model.hidden)}
-    kept = (*CHANNELS, *(name for name in LEANING if name in model.state))
+    kept = (*MEASURED_MOTION, *(name for name in LEANING if name in model.state))
     path = rollout(
         vessel,
         start | body_velocities(start),
@@ -151,7 +151,9 @@ def _predict_alike(
     channels = {name: path[name] for name in kept}
     with np.errstate(all="ignore"):  # a path that diverges
         channels |= horizontal_velocities(channels)
-    moved = np.stack([channels[name][:, 0] for name in CHANNELS], axis=-1)  # (N + 1, S, channels), as a log has them
+    moved = np.stack(
+        [channels[name][:, 0] for name in MEASURED_MOTION], axis=-1
+    )  # (N + 1, S, channels), as a log has them
     for number, piece in enumerate(pieces):
         states = moved[: piece.num_steps + 1, number]  # what follows belongs to no log
         sound = np.isfinite(states).all() and (np.hypot(*states[:, 3:5].T) <= SPEED_LIMIT).all()
@@ -170,20 +172,20 @@ def _state_series(
     numbers = np.array([piece.run for piece in pieces])
     place = np.arange(len(pieces)) - np.searchsorted(numbers, numbers)
     frames = [
-        pd.DataFrame(values, columns=list(CHANNELS)).assign(
+        pd.DataFrame(values, columns=list(MEASURED_MOTION)).assign(
             run=runs[piece.run], piece=number, t=piece.t, model=model,
             measured=piece.measured & (np.arange(len(piece.t)) > 0),
         )
         for number, piece, values in zip(place, pieces, states, strict=True)
     ]  # fmt: skip
-    return pd.concat(frames, ignore_index=True)[["run", "piece", "t", "model", *CHANNELS, "measured"]]
+    return pd.concat(frames, ignore_index=True)[["run", "piece", "t", "model", *MEASURED_MOTION, "measured"]]
 
 
 def _series_errors(series: pd.DataFrame) -> pd.DataFrame:
     """Root mean squares over the measured rows of all runs, and of each."""
-    log, rows = series.loc[series["model"] == MEASURED, list(CHANNELS)].to_numpy(), list[dict[str, object]]()
+    log, rows = series.loc[series["model"] == MEASURED, list(MEASURED_MOTION)].to_numpy(), list[dict[str, object]]()
     for model, mine in series[series["model"] != MEASURED].groupby("model", sort=False):
-        squares = pd.DataFrame((mine[list(CHANNELS)].to_numpy() - log) ** 2, columns=list(CHANNELS))
+        squares = pd.DataFrame((mine[list(MEASURED_MOTION)].to_numpy() - log) ** 2, columns=list(MEASURED_MOTION))
         squares["position"] = squares["north"] + squares["east"]
         for run in (ALL, *mine["run"].unique()):
             selected = mine["measured"].to_numpy() & (np.full(len(mine), run == ALL) | (mine["run"] == run).to_numpy())

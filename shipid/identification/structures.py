@@ -21,6 +21,7 @@ import numpy as np
 
 from shipid import document as documents
 from shipid.data.dataset import Array, Dataset
+from shipid.engine.casadi import input_symbols, summed_rates
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.identification.settings import Identify, measured_constants, without_zeros
 from shipid.physics.signals import is_steering
@@ -224,20 +225,14 @@ def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
 
     The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.
     """
-    sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
-    inputs = [ca.SX.sym(f"in{i}", size) for i, size in enumerate(sizes)]
-    parameters, dof = ca.SX.sym("parameters", len(model.parameters)), model.num_dof
+    inputs, dof = input_symbols(model), model.num_dof
     tau = ca.SX.sym("tau", dof)
-    total = tau
-    for term in model.sums:
-        for entry in () if term.arrays is None else term.arrays:
-            total = total + term.function(*inputs, parameters, entry)
-    acceleration = model.rates(*inputs, parameters, total)[dof : 2 * dof]
+    acceleration = ca.SX(summed_rates(model, inputs, tau, {}))[dof : 2 * dof]
     mass = ca.inv(ca.densify(ca.jacobian(acceleration, tau)))
     force = mass @ ca.substitute(acceleration, tau, ca.SX.zeros(dof))
-    theta = ca.vertcat(*(parameters[i] for i in free))
+    theta = ca.vertcat(*(inputs[-1][i] for i in free))
     result = [force, ca.densify(ca.jacobian(force, theta))]
-    return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
+    return ca.Function("equations", inputs, result, {"cse": True})
 
 
 def _hull_forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], zero: bool) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from shipid.data.dataset import BREAK
+from shipid.data.windows import from_frame, to_frame
 from shipid.errors import DataError
 
 INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"}
@@ -214,20 +215,18 @@ def scale_columns(rows: pd.DataFrame, repair: ScaleRepair) -> Outcome:
 
 def turn_heading(rows: pd.DataFrame, repair: HeadingOffset) -> Outcome:
     """Turn: psi <- psi + d; (u, v) <- R(-d) (u, v); the velocity over ground, R(psi) (u, v), does not change."""
-    c, s = np.cos(repair.offset), np.sin(repair.offset)
     turned = rows.assign(psi=rows["psi"] + repair.offset)
     if "u" in rows and "v" in rows:  # else they are estimated from the heading as it now is
-        u, v = rows["u"], rows["v"]
-        turned = turned.assign(u=c * u + s * v, v=c * v - s * u)
+        u, v = to_frame(rows["u"], rows["v"], 0.0, 0.0, repair.offset)
+        turned = turned.assign(u=u, v=v)
     return _all_rows(turned, f"{np.degrees(repair.offset):+.2f} deg")
 
 
 def move_origin(rows: pd.DataFrame, repair: LeverArm) -> Outcome:
     """Move: (north, east) <- (north, east) - R(psi) (x, y); u <- u + y r; v <- v - x r (rigid body)."""
     moved = rows
-    c, s = np.cos(rows["psi"]), np.sin(rows["psi"])
     if repair.moves != "velocity":
-        north, east = repair.x * c - repair.y * s, repair.x * s + repair.y * c
+        north, east = from_frame(repair.x, repair.y, 0.0, 0.0, rows["psi"])
         moved = moved.assign(north=rows["north"] - north, east=rows["east"] - east)
     if repair.moves != "position" and "v" in rows:  # else it is estimated from the position as it now is
         moved = moved.assign(v=rows["v"] - repair.x * rows["r"])

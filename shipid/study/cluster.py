@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from shipid.errors import ShipidError
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Row, Space
-from shipid.plugins import TRIED, import_files
+from shipid.plugins import TRIED_FILES, import_files
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -149,7 +149,7 @@ def _results(
     mistake: Exception | None = None
     lonely = False
     try:
-        client.register_worker_callbacks(partial(import_files, list(TRIED)))
+        client.register_worker_callbacks(partial(import_files, list(TRIED_FILES)))
         given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         for key, task in tasks:
             topic = f"{name}-{key}"

@@ -60,9 +60,9 @@ class Foundation:
         source = self.source
         return source if isinstance(source, Vessel) else None
 
-    def along(self, dataset: Dataset) -> Foundation:
+    def with_runs(self, dataset: Dataset) -> Foundation:
         """Return the foundation with the runs that a simulator may have to go along."""
-        return replace(self, base=self.base.along(dataset)) if isinstance(self.base, Simulator) else self
+        return replace(self, base=self.base.with_runs(dataset)) if isinstance(self.base, Simulator) else self
 
     @property
     def source(self) -> Vessel | Simulator | None:

@@ -25,7 +25,7 @@ from shipid.foundations.function import SimulatorFunction
 from shipid.hybrid.simulated import Simulator
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
-from shipid.plugins import TRIED
+from shipid.plugins import TRIED_FILES
 from shipid.simulation.families import expand_families
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
@@ -44,16 +44,14 @@ from shipid.study.schema import Data, Study
 from shipid.users import is_user_code, users_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve_families
+from shipid.vessel.ranges import UNUSUAL
 from shipid.vessel.schema import equation_functions
 
 WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
 OF_PARTS = ("repeat", "condition")  # keys that make several studies of one
-METHOD_CODE, TERM_CODE, FUNCTION_CODE = (
-    "code of the method",
-    "code of the term",
-    "code of the function",
-)  # entries of a session: name -> digest
+METHOD_CODE, TERM_CODE, FUNCTION_CODE = "code of the method", "code of the term", "code of the function"
+"""Entries of a session: name -> digest."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +212,7 @@ def default_folder(plan: Plan) -> Path:
 
 def program_of(plan: Plan) -> str:
     """The command line that knows methods and terms: `shipid`, with the files that the user tries."""
-    return " ".join(["shipid", *(f"--with {quote_argument(file)}" for file in TRIED if own_code(plan))])
+    return " ".join(["shipid", *(f"--with {quote_argument(file)}" for file in TRIED_FILES if own_code(plan))])
 
 
 def own_code(plan: Plan) -> dict[str, dict[str, str]]:
@@ -228,12 +226,12 @@ def own_code(plan: Plan) -> dict[str, dict[str, str]]:
         METHOD_CODE: {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()},
         TERM_CODE: {key: held for one in vessels_of(plan) for key, held in equation_functions(one.document).items()},
     }
-    functions = {key: one for key, one in plan.simulators.items() if isinstance(one, SimulatorFunction)}
     own = {
         what: {name: users_code(held) for name, held in named.items() if any(map(is_user_code, held))}
         for what, named in every.items()
     }
-    own[FUNCTION_CODE] = {key: one.code_digest for key, one in functions.items()}
+    simulators = plan.simulators.items()
+    own[FUNCTION_CODE] = {key: one.code_digest for key, one in simulators if isinstance(one, SimulatorFunction)}
     return {what: digests for what, digests in own.items() if digests}
 
 
@@ -525,9 +523,6 @@ def _check_memory(truth: Truth, vessel: Vessel) -> None:
             raise DocumentError(words, path=f"truth.{path}")
 
 
-UNUSUAL_KEY = "unusual"
-"""Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
-
 RANGES: dict[str, tuple[float, float, str]] = {
     "truth.duration": (0.0, LONGEST, "s"),
     "truth.run_up": (0.0, LONGEST, "s"),
@@ -556,7 +551,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 
 def check_ranges(document: Document) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
-    meant = document.get(UNUSUAL_KEY, [])
+    meant = document.get(UNUSUAL, [])
     for path, value in documents.document_leaves(document):
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
@@ -567,5 +562,5 @@ def check_ranges(document: Document) -> None:
         least, most, unit = limits
         if not least <= value <= most:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
-            remedy = f'if it is meant, write {UNUSUAL_KEY} = ["{named}"] at the top of the study'
+            remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
             raise DocumentError(f"{message}; {remedy}", path=path)

@@ -269,7 +269,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         notes.append(
             f"runs that move as others do ({copies}): errors and intervals take them for new: leave out copies"
         )
-    plan = replace(plan, foundations=tuple(one.along(dataset) for one in plan.foundations))
+    plan = replace(plan, foundations=tuple(one.with_runs(dataset) for one in plan.foundations))
     looked_at: set[tuple[str, str]] = set()
     for foundation in plan.foundations:
         if isinstance(foundation.base, Vessel):
@@ -277,8 +277,8 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
             notes += not_measured(foundation.base, test)
         elif foundation.base is not None and (one := (foundation.family, foundation.base.key)) not in looked_at:
             looked_at.add(one)
-            place = f"family.{foundation.family}.predictions"
-            meant = any(documents.match_paths(str(one), [place]) for one in plan.study.unusual)
+            place = f"family.{foundation.family}.{foundation.base.kind}"
+            meant = any(documents.match_paths(str(pattern), [place]) for pattern in plan.study.unusual)
             remedy = "" if meant else f'if it is meant so, write unusual = ["{place}"] at the top of the study'
             notes += foundation.base.check(rest, test, steps_before(plan, foundation.name), remedy)
     for way in plan.methods:

@@ -16,11 +16,11 @@ import pandas as pd
 
 from shipid.arguments import check_choice
 from shipid.data.dataset import read_dataset
-from shipid.data.windows import Windows, from_frame, join_windows
+from shipid.data.windows import Windows, join_windows
 from shipid.errors import ShipidError
 from shipid.files import write_json, write_table
-from shipid.foundations.faults import PLACES
 from shipid.foundations.predictions import KEYS, PredictionTable, long_table, prediction_table
+from shipid.hybrid.features import earlier_instants
 from shipid.physics.signals import measurable_signals
 from shipid.study import store
 from shipid.study.cells import predictions
@@ -107,16 +107,16 @@ class StudyWindows:
     def _earlier_rows(self, count: int) -> dict[str, pd.DataFrame]:
         """Rows of `windows` and `future` for the instants so many steps before each window, with the orders since."""
         cut, names = self.windows, self.names
-        then = {name: values[-count] for name, values in cut.past.items()}
-        places = from_frame(then["x"], then["y"], *(cut.columns[name] for name in (*PLACES, "psi")))
-        t = cut.t - count * cut.step
-        kept = [name for name in (*names["state"], *names["wind"], *names["orders"]) if name not in PLACES]
+        then = earlier_instants(cut.instants(), count, cut.step)
         given = {name: cut.past[name][-count:] for name in names["orders"]}
-        given |= {name: np.tile(then[name], (count, 1)) for name in names["wind"]}
-        rows = long_table(replace(cut, t=t), cut.step * np.arange(1, count + 1), given)
-        keys = {"run": cut.run, "instant": t, "split": "earlier", "fold": -1}
-        now = keys | dict(zip(PLACES, places, strict=True))
-        return {"windows": pd.DataFrame(now | {name: then[name] for name in kept}), "future": rows}
+        given |= {name: np.tile(then.columns[name], (count, 1)) for name in names["wind"]}
+        now: dict[str, Any] = {"run": cut.run, "instant": then.t, "split": "earlier", "fold": -1}
+        now |= {name: then.columns[name] for name in (*names["state"], *names["wind"], *names["orders"])}
+        cut = replace(cut, t=now["instant"])
+        return {
+            "windows": pd.DataFrame(now),
+            "future": long_table(cut, cut.step * np.arange(1, count + 1), given),
+        }
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the tables as Parquet into a folder; the files. OSError where it cannot be written."""
@@ -164,18 +164,18 @@ def windows(
     )
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
-    if every:  # the tables that are to be made
-        others = (one for one in plan.foundations if not isinstance(one.base, PredictionTable))
-        plan = replace(plan, foundations=tuple(others))
+    if every:  # without the tables that are to be made
+        plan = replace(
+            plan, foundations=tuple(one for one in plan.foundations if not isinstance(one.base, PredictionTable))
+        )
     grid = plan.study.grid
     amount = max(grid.N_D) if N_D is None else N_D
     check_choice("N_D", str(amount), map(str, grid.N_D))
     seeds = plan.study.seeds_of(amount)
     batch = Batch(amount, seeds[0] if seed is None else seed)
     check_choice("seed", str(batch.seed), map(str, seeds))
-    stored = folder is not None and (folder / store.DATASET).is_file()
-    dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
-    prepared = prepare(plan, dataset, device)
+    stored = place / store.DATASET
+    prepared = prepare(plan, read_dataset(stored) if folder and stored.is_file() else obtain_runs(plan), device)
     runs, known = tuple(prepared.pool.spans) if every else prepared.runs(batch), plan.study.prediction.known
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
     cut = join_windows([hide_future(train, known, True), hide_future(prepared.test, known, with_truth)])

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
 from shipid.interrupts import hold_interrupts
-from shipid.plugins import TRIED, add_members, added_members, import_files
+from shipid.plugins import TRIED_FILES, add_members, added_members, import_files
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in which a forkserver has its socket
@@ -60,7 +60,7 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
         yield from ((task, work(task)) for task in tasks)
         return
     _check_guard()
-    given = (pickle.dumps(work), TRIED, added_members())
+    given = (pickle.dumps(work), TRIED_FILES, added_members())
     pool = ProcessPoolExecutor(count, get_context(_method()), _begin, given)
     workers = pool._processes  # Python 3.14 has `kill_workers`
     try:

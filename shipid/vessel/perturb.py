@@ -421,7 +421,7 @@ def draw_members(
 def _draw_steps(family: Family, base: PerturbedBase, file: str | Path | None) -> list[Step]:
     """What a member changes, in order; DocumentError for a path that the base does not have."""
     check_class("family", family, Family, "such as Family(name=..., perturb=[...])")
-    check_class("base", base, PerturbedBase, "as of `load_vessel`")
+    check_class("base", base, PerturbedBase, "such as a Vessel, as of `load_vessel`")
     if family.extends is not None:
         raise DocumentError(
             f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve_families`",

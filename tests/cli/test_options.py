@@ -23,7 +23,7 @@ import shipid
 from shipid.cli import app
 from shipid.errors import DocumentError, ShipidError
 from shipid.vessel.usv import SmallCraft
-from tests.cli.running import BAD
+from tests.cli.running import BAD, ended
 from tests.study.tiny import TINY
 
 
@@ -316,3 +316,9 @@ def test_every_option_has_such_a_case() -> None:
     known = list(options(typer.main.get_command(app), ()))
     assert len(known) > 60
     assert [one for one in known if not used & set(one[1])] == []
+
+
+@pytest.mark.parametrize("words", ["vessel list --with my.py", "vessel list --with=my.py", "--with my.py vessel list"])
+def test_files_that_are_tried_may_stand_behind_the_command(words: str) -> None:
+    status, _, said = ended(*words.split())
+    assert (status, said.strip()) == (1, "error: my.py: --with: no such file: on a cluster each machine needs it")

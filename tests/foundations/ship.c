@@ -47,7 +47,7 @@ static int step_ship(Ship *s, double h)
     }
     s->time += h;
     if (s->time > 5) switch ((int)x[FAULT]) {
-        case 1: return 3;
+        case 1: fprintf(stderr, "the shaft is stuck\n"); return 3;
         case 2: exit(1);
         case 3: for (;;) continue;
         case 4: for (i = 0; i < 100; ++i) printf("nobody reads this line\n");

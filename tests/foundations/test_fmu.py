@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.foundations.fmu import Along, SimulatorFmu
+from shipid.foundations.fmu import RunTrack, SimulatorFmu
 from tests.foundations.foreign import build_ship, motion_of_ship, write_table
 
 STEP, HORIZON, COUNT = 0.5, 20, 6
@@ -76,7 +76,7 @@ def test_a_ship_without_start_values_runs_along_the_run(folder, version, branche
     rows = [0, 5, 17, 30]
     held = {name: np.repeat(values[rows][:, None], HORIZON, axis=1) for name, values in orders.items()}
     known = {name: np.stack([values[row : row + HORIZON] for row in rows]) for name, values in orders.items()}
-    along = [Along({**orders, "psi": motion[:-1, 2]}, range(len(rows)), rows)]
+    along = [RunTrack({**orders, "psi": motion[:-1, 2]}, range(len(rows)), rows)]
     begun = motion[rows]
     for ahead in (held, known):
         found, faults = fmu.simulate(begun, ahead, STEP, along)
@@ -87,7 +87,9 @@ def test_a_ship_without_start_values_runs_along_the_run(folder, version, branche
     np.testing.assert_allclose(found[:, 1:], motion_of_ship(turned, known, STEP), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("fault", "words"), [(1, "status 3"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")])
+@pytest.mark.parametrize(
+    ("fault", "words"), [(1, "5 s (the shaft is stuck)"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")]
+)
 def test_a_failing_ship_is_lost_from_there_on(folder, fault, words):
     """An error keeps what was before; the first window does not take the second one with it."""
     fmu = as_fmu(write_table(build_ship(folder / "fails.fmu"), more="limit = 1"))
@@ -119,6 +121,9 @@ def test_what_a_ship_prints_goes_nowhere(folder, capfd):
         ('variable = "rudder"', 'variable = "rate"', "'rate' has the causality output, no output of rudder.delta"),
         ('"rudder.delta"', '"rudder.angle"', "no signal: give north, east"),
         ("file =", "fil =", "missing"),
+        ('variable = "rpm"', 'variables = "rpm"', "fmu.propeller.n.variables: unknown key"),
+        ("scale = -1", "scale = true", "fmu.v.scale: "),
+        ("scale = -1", "scale = 0", "a scale that is not 0"),
         ("limit = 1", "limit = -1", "must be"),
     ],
 )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -160,5 +162,9 @@ def test_a_ship_that_turns_the_other_way_is_refused(tmp_path):
     plan = study_of(tmp_path, {"fmu": table.name, "equal": True}, {"fmu": table.name})
     dataset = obtain_runs(plan)
     table.write_text(table.read_text().replace('"rudder", unit = "deg"', '"rudder", unit = "deg", scale = -1'))
-    with pytest.raises(DataError, match="acts the other way in the runs"):
-        prepare(study_of(tmp_path, {"fmu": table.name, "equal": True}), dataset)
+    turned, key = study_of(tmp_path, {"fmu": table.name, "equal": True}), "family.one.fmu"
+    with pytest.raises(DataError, match=rf'acts the other way in the runs.*write unusual = \["{key}"\]') as error:
+        prepare(turned, dataset)
+    assert (str(error.value.file), error.value.path) == (str(table), "fmu.rudder.delta")
+    meant = replace(turned, study=turned.study.model_copy(update={"unusual": [key]}))
+    assert prepare(meant, dataset).test_paths["one-1"].size

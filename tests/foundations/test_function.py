@@ -24,7 +24,7 @@ Array = np.ndarray
 FAMILY = '[[family]]\nname = "mine"\nfunction = "{}"\n'
 DRAWN = """members = 3
 [[family.perturb]]
-parameters = ["{0}N_ur", "{0}Y_uv"]
+parameters = ["N_ur", "Y_uv"]
 factor = [0.5, 1.5]
 """
 
@@ -67,22 +67,16 @@ def test_the_function_is_given_states_orders_and_weather_in_batches() -> None:
 
 
 def test_a_family_of_its_numbers_is_the_family_of_the_vessel(tmp_path: Path) -> None:
-    own = '[[family]]\nname = "mine"\nbase = "gunnerus-28.9"\n' + DRAWN.format("hull.derivatives.")
-    paths = []
-    for families in (FAMILY.format("my_ship:simulate") + DRAWN.format(""), own.replace("members", "seed = 0\nmembers")):
-        plan = shipid.read_plan(study_file(tmp_path, families), trust=True)
-        prepared = prepare(plan, obtain_runs(plan))
-        factors = [[*one.variant.factors.values()] for one in prepared.foundations if one.variant is not None]
-        paths.append((factors, prepared.test_paths))
-    for k in range(3):
-        # a draw depends on the path of its parameter: members are made equal by their own factors
-        assert len({tuple(row) for row in paths[0][0]}) == 3
-        assert all(0.5 <= factor <= 1.5 for factor in paths[0][0][k])
-    values = dict(zip(("hull.derivatives.N_ur", "hull.derivatives.Y_uv"), paths[0][0][1], strict=True))
-    ship = shipid.load_vessel("gunnerus-28.9")
-    changed = ship.with_values({path: ship.parameters[path] * factor for path, factor in values.items()})
-    physics = shipid.Physics(changed, plan.study.prediction.horizon, plan.study.prediction.step)
-    np.testing.assert_allclose(paths[0][1]["mine-2"], physics.paths(prepared.test.instants()), atol=1e-9)
+    plan = shipid.read_plan(study_file(tmp_path, FAMILY.format("my_ship:simulate") + DRAWN), trust=True)
+    prepared, ship = prepare(plan, obtain_runs(plan)), shipid.load_vessel("gunnerus-28.9")
+    drawn = {one.name: one.variant.factors for one in prepared.foundations if one.variant is not None}
+    assert len({tuple(factors.values()) for factors in drawn.values()}) == 3
+    for name, factors in drawn.items():
+        assert all(0.5 <= factor <= 1.5 for factor in factors.values())
+        paths = {f"hull.derivatives.{parameter}": factor for parameter, factor in factors.items()}
+        changed = ship.with_values({path: ship.parameters[path] * factor for path, factor in paths.items()})
+        physics = shipid.Physics(changed, plan.study.prediction.horizon, plan.study.prediction.step)
+        np.testing.assert_allclose(prepared.test_paths[name], physics.paths(prepared.test.instants()), atol=1e-9)
 
 
 def test_where_it_gives_no_number_the_path_goes_on_and_a_note_says_so(tmp_path: Path) -> None:
@@ -101,7 +95,7 @@ def test_where_it_gives_no_number_the_path_goes_on_and_a_note_says_so(tmp_path: 
         ("my_ship", "write 'module:function', or a name that Python put into FUNCTIONS"),
         ("my_ship:simulat", "my_ship has no function 'simulat'.*simulate"),
         ("my_ship:few", r"must take \(states, orders, weather, step\), and numbers by keyword"),
-        ("no_such_ship:simulate", "no_such_ship cannot be imported"),
+        ("no_such_ship:simulate", "no_such_ship: cannot be imported: .*; write no_such_ship.py beside the document"),
     ],
 )
 def test_a_wrong_name_is_one_line(tmp_path: Path, name: str, words: str) -> None:
@@ -130,7 +124,7 @@ def test_code_of_a_document_runs_with_trust_or_from_python(tmp_path: Path, regis
     assert status
     assert "my_ship:simulate is code that this document names: read it, and add --trust to run it" in said
     status, _, said = ended("study", "run", file, "--out", tmp_path / "run", "--trust")
-    assert "cannot be imported (SystemExit: it ran)" in said
+    assert "my_ship.py: cannot be imported: SystemExit: it ran in " in said
     registry["mine"] = gives_the_start
     (one,) = SimulatorFunction.read("mine", tmp_path, trust=False)
     assert one.parameters == {"drag": 1.5}

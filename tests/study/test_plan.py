@@ -222,7 +222,7 @@ def test_the_command_of_a_users_method_names_the_file(tmp_path: Path, monkeypatc
     class Mine(PathDrawn):
         """Of a user: no class of shipid."""
 
-    monkeypatch.setattr("shipid.study.plan.TRIED", [Path("my files/own.py")])
+    monkeypatch.setattr("shipid.study.plan.TRIED_FILES", [Path("my files/own.py")])
     assert run_command(tiny_plan(tmp_path)).startswith("shipid study run ")
     monkeypatch.setitem(METHODS, "mine", Mine)
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine", "trials": 1, "units": 8, "terms": 4}]})

@@ -95,7 +95,7 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
 
 def test_a_folder_with_a_term_of_a_user_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It said that the run is of another version, and to compute it again."""
-    monkeypatch.setattr("shipid.study.plan.TRIED", [Path("mine.py")])
+    monkeypatch.setattr("shipid.study.plan.TRIED_FILES", [Path("mine.py")])
     _, plan = skeg_plan(tmp_path, monkeypatch)
     folder = tmp_path / "run"
     make_run(folder, plan)
