@@ -93,7 +93,7 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
 def _last_line(log: Any) -> str:
     """The last line that the FMU printed, in brackets."""
     end = os.fstat(log.fileno()).st_size
-    lines = os.pread(log.fileno(), LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").split("\n")
+    lines = os.pread(log.fileno(), LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").strip("\0").split("\n")
     return next((f" ({line.strip()})" for line in reversed(lines) if line.strip()), "")
 
 
@@ -111,7 +111,9 @@ class FmuInstance:
         """Take a new instance."""
         from fmpy.simulation import instantiate_fmu
 
-        self.fmu, self.used, self.time = instantiate_fmu(self.folder, self.description, "CoSimulation"), False, 0.0
+        # with its log: the last line says why it fails
+        self.fmu = instantiate_fmu(self.folder, self.description, "CoSimulation", debug_logging=True)
+        self.used, self.time = False, 0.0
         real = "Float64" if self.version == "3" else "Real"
         self.get, self.set = getattr(self.fmu, f"get{real}"), getattr(self.fmu, f"set{real}")
 
@@ -177,5 +179,4 @@ def _serve(connection: Connection, folder: str) -> None:
 
 
 if __name__ == "__main__":
-    with Connection(int(sys.argv[1])) as pipe:
-        _serve(pipe, sys.argv[2])
+    _serve(Connection(int(sys.argv[1])), sys.argv[2])  # open until an error is printed
