@@ -72,10 +72,9 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
                 while left and here.poll(allowed):
                     rows, fault = here.recv()
                     if rows is not None:  # else it is loaded now
-                        yield rows, fault + _last_line(log) * bool(fault)
+                        yield rows, fault
                         del left[0]
                     allowed = limit
-                    os.ftruncate(log.fileno(), 0)
                 fault = f"takes longer than {allowed:g} s"
             except (EOFError, OSError):
                 fault = "ends its process"
@@ -83,17 +82,17 @@ def run_fmu(folder: Path, call: FmuCall, runs: Sequence[FmuRun], limit: float) -
                 process.kill()
                 process.wait()
             if left:
-                fault += _last_line(log)
+                fault += _last_line(log.fileno())
                 yield [], fault
                 del left[0]
                 ends += 1
     yield from (([], fault) for _ in left)
 
 
-def _last_line(log: Any) -> str:
+def _last_line(log: int) -> str:
     """The last line that the FMU printed, in brackets."""
-    end = os.fstat(log.fileno()).st_size
-    lines = os.pread(log.fileno(), LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").strip("\0").split("\n")
+    end = os.fstat(log).st_size
+    lines = os.pread(log, LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").strip("\0").split("\n")
     return next((f" ({line.strip()})" for line in reversed(lines) if line.strip()), "")
 
 
@@ -175,7 +174,8 @@ def _serve(connection: Connection, folder: str) -> None:
         except Exception as error:
             fault = f"{error} at {one.time:g} s"
         sys.stdout.flush()
-        connection.send((rows, fault))
+        connection.send((rows, fault + _last_line(1) * bool(fault)))
+        os.ftruncate(1, 0)  # by the one who writes: else lines of the next run are lost
 
 
 if __name__ == "__main__":

@@ -293,8 +293,8 @@ class SimulatorFmu(SimulatorFunction):
         along = [Along(still | one, [place], [0]) for place, one in enumerate(held)]
         motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, along)
         if not np.isfinite(motion).all():
-            at, name = np.argwhere(~np.isfinite(motion))[0][1:]
-            fault = faults[0] if faults else f"{STATES[name]} is no number after {at * step:g} s"
+            at = np.argwhere(~np.isfinite(motion))[:, 1].min()
+            fault = faults[0] if faults else f"its motion is no number after {at * step:g} s"
             raise DocumentError(f"the FMU fails in a step response: {fault}", file=self.file)
         if doubt := doubt_of_rates(motion, step, EXACT):
             raise DocumentError(f"fmu.{doubt}", file=self.file)
