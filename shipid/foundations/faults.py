@@ -126,7 +126,7 @@ def doubt_of_rates(motion: Array, step: float, slope: float = SLOPE) -> str:
     along = np.diff(north + 1j * east) * np.exp(-1j * middle)
     changes, fastest = (np.diff(psi), along.real, along.imag), np.hypot(*rates[1:]).max()
     for name, what, change, rate in zip("ruv", ("heading", "place", "place"), changes, rates, strict=True):
-        size = float((rate**2).sum())
+        size = float((rate**2).sum()) * bool(change.any())  # a heading that is held may leave r as it was
         ratio = float((change * rate).sum()) / (step * size) if size else 1.0
         if abs(ratio - 1) > slope and (name != "v" or np.sqrt(size) > SLIGHT * fastest):
             return (
