@@ -117,7 +117,9 @@ class FmuInstance:
         """Take a new instance."""
         from fmpy.simulation import instantiate_fmu
 
-        self.fmu, self.used, self.time = instantiate_fmu(self.folder, self.description, "CoSimulation"), False, 0.0
+        # with its log: the last line says why it fails
+        self.fmu = instantiate_fmu(self.folder, self.description, "CoSimulation", debug_logging=True)
+        self.used, self.time = False, 0.0
         real = "Float64" if self.version == "3" else "Real"
         self.get, self.set = getattr(self.fmu, f"get{real}"), getattr(self.fmu, f"set{real}")
 
@@ -183,5 +185,4 @@ def _serve(connection: Connection, folder: str) -> None:
 
 
 if __name__ == "__main__":
-    with Connection(int(sys.argv[1])) as pipe:
-        _serve(pipe, sys.argv[2])
+    _serve(Connection(int(sys.argv[1])), sys.argv[2])  # open until an error is printed

@@ -6,7 +6,7 @@ error at the first step and over the whole horizon, and does not do so for const
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -18,6 +18,8 @@ Array = np.ndarray
 PLACES = ["north", "east"]
 BELIEVED = 0.75  # times the error as given: a change of the places that leaves less undoes a mistake
 GENERAL = 0.3  # times the error under any other hypothesis: a wrong start explains more if less is left
+SLOPE = 0.4  # by which changes of heading and place may differ from the integrals of r, u and v, as a share
+SLIGHT = 0.1  # times the speed: less is no drift
 FORESEEN = 0.2  # times the least error that can be believed: less is knowledge of the future
 
 
@@ -112,6 +114,36 @@ def doubt_of_places(places: Array, test: Windows, believable: Array | None = Non
     return (
         f"saw the future: at a step its error is {share:.2g} of the least that can be known" if share < FORESEEN else ""
     )
+
+
+def doubt_of_rates(motion: Array, step: float, slope: float = SLOPE) -> str:
+    """Say which of r, u, v the changes of heading and place do not follow; empty where they do.
+
+    motion : (S, K + 1, 6) north, east [m], psi [rad], u, v [m/s], r [rad/s], steps [s] apart.
+    """
+    north, east, psi, u, v, r = np.moveaxis(motion, -1, 0)
+    middle, *rates = [(one[:, 1:] + one[:, :-1]) / 2 for one in (psi, r, u, v)]
+    along = np.diff(north + 1j * east) * np.exp(-1j * middle)
+    changes, fastest = (np.diff(psi), along.real, along.imag), np.hypot(*rates[1:]).max()
+    for name, what, change, rate in zip("ruv", ("heading", "place", "place"), changes, rates, strict=True):
+        size = float((rate**2).sum()) * bool(change.any())  # a heading that is held may leave r as it was
+        ratio = float((change * rate).sum()) / (step * size) if size else 1.0
+        if abs(ratio - 1) > slope and (name != "v" or np.sqrt(size) > SLIGHT * fastest):
+            return (
+                f"{name}: {what} changes by {ratio:.3g} times the integral of {name}: "
+                "check sign (scale), unit and frame of both"
+            )
+    return ""
+
+
+def doubt_of_motion(states: Mapping[str, Array], cut: Windows) -> str:
+    """Say what seems to be wrong with states, name -> (T, S), of some windows; empty where nothing does."""
+    doubt = doubt_of_places(np.stack([states[name] for name in PLACES], axis=-1), cut)
+    names = (*PLACES, "psi", "u", "v", "r")
+    if doubt or not states.keys() >= {*names}:
+        return doubt
+    motion = [np.insert(states[name], 0, cut.columns.get(name, states[name][0]), axis=0).T for name in names]
+    return doubt_of_rates(np.stack(motion, axis=-1), cut.step)
 
 
 def errors_at_steps(path: Array, test: Windows) -> Array:

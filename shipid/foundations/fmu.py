@@ -26,19 +26,18 @@ from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
 from shipid.data.windows import Instants, Windows, from_frame, to_frame
 from shipid.engine.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
+from shipid.foundations.faults import doubt_of_rates
 from shipid.foundations.function import SimulatorFunction
 from shipid.logs.mapping import UNITS
 from shipid.observer import MEASURED_MOTION
-from shipid.physics.signals import ACTUAL, SIGNALS, is_command, signal_of
+from shipid.physics.signals import ACTUAL, SIGNALS, is_command, is_steering, signal_of
 from shipid.units import DEGREE
 
 log = logging.getLogger(__name__)
 
 Array = np.ndarray
 RESPONSE = 120.0  # s of a step response
-SLOPE = 0.1  # by which the changes of place and heading may differ from the integrals of u, v and r, as a share
-LOOKED_AT = 100  # training windows on which the signs of orders are tried
-OTHER_WAY = 0.5  # times the error at the horizon as it is: an order with another sign that leaves less has it
+EXACT = 0.1  # by which, in a step response, changes may differ from integrals of rates, as a share
 
 
 Role = Literal["input", "output", "start", "parameter"]
@@ -169,27 +168,19 @@ class SimulatorFmu(SimulatorFunction):
         """Return the FMU with the runs that it may have to go along."""
         return replace(self, runs=dataset)
 
-    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:  # noqa: ARG002
+    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:
         """Say how it responds to its orders; DocumentError, DataError where signs, units or frames seem to be wrong."""
         columns = training.columns
-        usual = {name: float(np.median(values)) for name, values in columns.items() if name == "u" or "." in name}
+        usual = {
+            name: 0.0 if name != "u" and is_steering(name) else float(np.median(values))  # the helm amidships
+            for name, values in columns.items()
+            if name == "u" or "." in name
+        }
         inputs = {name: usual.get(name, 0.0) for name in columns}
         high = {name: float(np.quantile(columns[name], 0.95)) for name in usual if "." in name}
         changes = {name: value - usual[name] for name, value in high.items() if value > usual[name]}
         said = self.describe_response(np.array([0.0, 0.0, 0.0, usual["u"], 0.0, 0.0]), inputs, changes)
-        some = training.select(np.arange(0, len(training), max(len(training) // LOOKED_AT, 1)))
-        given, own = some.instants(known=True), [link.signal for link in self.fmu.links["input"] if link.signal in high]
-        begun, orders, weather = self.arguments_of(given, some.horizon)
-        goal = np.stack(from_frame(*some.future[-1].T, *begun[:, :3].T), axis=-1)
-        errors = dict[str, float]()
-        for name in ("", *own):  # as it is, and with each order the other way
-            turned = {key: -values if key == name else values for key, values in orders.items()}
-            motion, _ = self.simulate(begun, turned | weather, some.step, self._tracks_of(given, some.step))
-            errors[name] = float(np.hypot(*(motion[:, -1, :2] - goal).T).mean())
-        least = min(errors, key=errors.__getitem__)
-        if remedy and errors[least] < OTHER_WAY * errors[""]:
-            words = f"{least} acts the other way in the runs: check sign (scale) and frame of its row"
-            raise DataError(f"{words}; {remedy}", file=self.file, path=f"fmu.{least}")
+        super().check(training, test, before, remedy)
         way = "starts from the state of each window" if self.fmu.startable else "takes no u and r: runs along each run"
         return [f"{self.key}: {words}" for words in (way, *said)]
 
@@ -304,36 +295,23 @@ class SimulatorFmu(SimulatorFunction):
         along = [RunTrack(still | one, [place], [0]) for place, one in enumerate(held)]
         motion, faults = self.simulate(np.tile(state, (len(held), 1)), ahead, step, along)
         if not np.isfinite(motion).all():
-            raise DocumentError(f"the FMU fails in a step response: {'; '.join(faults[:1])}", file=self.file)
-        self._check_rates(motion, step)
-        sides = ["starboard" if r > 0 else "port" for r in motion[:, -1, 5]]
+            at = np.argwhere(~np.isfinite(motion))[:, 1].min()
+            fault = faults[0] if faults else f"its motion is no number after {at * step:g} s"
+            raise DocumentError(f"the FMU fails in a step response: {fault}", file=self.file)
+        if doubt := doubt_of_rates(motion, step, EXACT):
+            raise DocumentError(f"fmu.{doubt}", file=self.file)
         return [
-            f"{name} {change:+.3g} {SIGNALS[signal_of(name)].unit}: after {RESPONSE:g} s it turns to {side} by "
-            f"{abs(end[5]) / DEGREE:.2g} deg/s at {np.hypot(*end[3:5]):.3g} m/s"
-            for (name, change), side, end in zip(changes.items(), sides, motion[:, -1], strict=True)
+            f"{name} {change:+.3g} {SIGNALS[signal_of(name)].unit}: after {RESPONSE:g} s it turns "
+            f"to {'starboard' if end[5] > 0 else 'port'} by {abs(end[5]) / DEGREE:.2g} deg/s "
+            f"at {np.hypot(*end[3:5]):.3g} m/s"
+            for (name, change), end in zip(changes.items(), motion[:, -1], strict=True)
         ]
-
-    def _check_rates(self, motion: Array, step: float) -> None:
-        """Raise DocumentError where changes of heading and place are not the integrals of r, u and v."""
-        north, east, psi, u, v, r = np.moveaxis(motion, -1, 0)
-        middle, *rates = [(one[:, 1:] + one[:, :-1]) / 2 for one in (psi, r, u, v)]
-        along, across = to_frame(np.diff(north), np.diff(east), 0.0, 0.0, middle)
-        fastest = np.hypot(*rates[1:]).max()
-        for name, change, rate in zip("ruv", (np.diff(psi), along, across), rates, strict=True):
-            size = float((rate**2).sum())
-            slope = float((change * rate).sum()) / (step * size) if size else 1.0
-            if abs(slope - 1) > SLOPE and (name != "v" or np.sqrt(size) > SLOPE * fastest):
-                what = "heading changes" if name == "r" else "place changes"
-                words = (
-                    f"{what} by {slope:.3g} times the integral of {name}: check sign (scale), unit and frame of both"
-                )
-                raise DocumentError(words, file=self.file, path=f"fmu.{name}")
 
     def steps_within(self, step: float) -> int:
         """Steps of the FMU in one of the prediction."""
         every = whole_steps(step, self.fmu.table.step or step)
         if not every:
-            words = f"{self.fmu.table.step:g} s: the step of the prediction, {step:g} s, must be a multiple"
+            words = f"{self.fmu.table.step:g} s: {step:g} s (prediction.step or truth.step) is no multiple of it"
             raise DocumentError(words, file=self.file, path="fmu.step")
         return every
 
@@ -347,9 +325,8 @@ class SimulatorFmu(SimulatorFunction):
         """Values (..., n) of the variables of a role; ShipidError where a signal is not there."""
         links = self.fmu.links[role]
         if missing := next((link.signal for link in links if link.signal not in signals), None):
-            raise DocumentError(
-                f"the FMU takes {missing}, which the runs do not have", file=self.file, path=f"fmu.{missing}"
-            )
+            words = f"the FMU takes {missing}, which the runs do not have: {suggest_name(missing, signals)}"
+            raise DocumentError(words, file=self.file, path=f"fmu.{missing}")
         values = dict(signals)
         if any(link.over_ground for link in links):
             north, east = from_frame(signals["u"], signals["v"], 0.0, 0.0, signals["psi"])

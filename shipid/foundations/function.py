@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -12,8 +12,9 @@ from typing import Any, ClassVar, Self, cast
 import numpy as np
 
 from shipid.arguments import as_float_array
-from shipid.data.windows import Instants
+from shipid.data.windows import Instants, Windows
 from shipid.errors import DataError, DocumentError, suggest_name
+from shipid.foundations.faults import PLACES, doubt_of_motion, errors_at_steps, path_of_places
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
 from shipid.observer import MEASURED_MOTION
@@ -25,6 +26,8 @@ SimulateFunction = Callable[..., Any]
 FUNCTIONS: Registry[SimulateFunction] = Registry("shipid.foundations", partial(fault_of_kind, Callable))
 """Name, as after `function = ` in a document -> function, of Python or an installed package: it needs no trust."""
 ARGUMENTS = ("states", "orders", "weather", "step")
+LOOKED_AT = 50  # training windows on which signs of orders are tried
+OTHER_WAY = 0.5  # times the error at the horizon as it is: an order with another sign that leaves less has it
 BATCH = 1000  # instants of a call: 300 steps of 20 columns are 48 MB
 
 
@@ -61,13 +64,16 @@ class SimulatorFunction(NamedSimulator):
     @classmethod
     def from_header(cls, header: Mapping[str, Any], folder: Path, trust: bool) -> Self:  # noqa: ARG003
         """Return the function of a stored study; its code is not needed until it is called."""
-        known = {name: header[name] for name in ("key", "digest", "parameters", "file")}
-        return cls(**known, trust=trust, given=FUNCTIONS.get(header["key"]))
+        return cls(
+            header["key"], header["digest"], header["parameters"], header["file"], trust, FUNCTIONS.get(header["key"])
+        )
 
     def header(self) -> dict[str, Any]:
         """Return its name, the digest of its code, its parameters and its file."""
-        named = {name: getattr(self, name) for name in ("kind", "key", "digest", "file")}
-        return {**named, "parameters": dict(self.parameters)}
+        return {
+            **{name: getattr(self, name) for name in ("kind", "key", "digest", "file")},
+            "parameters": dict(self.parameters),
+        }
 
     def with_values(self, values: Mapping[str, float]) -> Self:
         """Return the function with other parameters."""
@@ -114,6 +120,29 @@ class SimulatorFunction(NamedSimulator):
         weather = {name: np.tile(columns[name][:, None], horizon) for name in measurable_signals(columns)}
         return begun, orders, weather
 
+    def check(self, training: Windows, test: Windows, before: Collection[int], remedy: str) -> Sequence[str]:  # noqa: ARG002
+        """DataError, with a remedy, where sign, unit or frame of its orders or its motion seem to be wrong."""
+        some = training.select(np.arange(0, len(training), max(len(training) // LOOKED_AT, 1)))
+        states = self.states(some.instants(known=True), some.horizon, some.step)
+        sound = np.asarray(np.isfinite([*states.values()]).all(axis=(0, 1)))
+        if remedy and sound.any():
+            some, states = some.select(sound), {name: values[:, sound] for name, values in states.items()}
+            if doubt := self._doubt_of_orders(some) or doubt_of_motion(states, some):
+                raise DataError(f"{doubt}; {remedy}", file=self.file)
+        return ()
+
+    def _doubt_of_orders(self, some: Windows) -> str:
+        """Say which order moves the ship as in the runs with the other sign; empty: none."""
+        given, errors = some.instants(known=True), dict[str, float]()
+        for name in ("", *(planned := given.planned or {})):  # as it is, and with each order the other way
+            turned = {key: -values if key == name else values for key, values in planned.items()}
+            states = self.states(replace(given, planned=turned), some.horizon, some.step)
+            path = path_of_places(np.stack([states[key] for key in PLACES], axis=-1), some)
+            errors[name] = float(errors_at_steps(path, some)[-1])
+        least = min(errors, key=errors.__getitem__)
+        words = f"{least} acts the other way in the runs: check its sign (scale) and frame"
+        return words if errors[least] < OTHER_WAY * errors[""] else ""
+
     def states(self, instants: Instants, horizon: int, step: float) -> Mapping[str, Array]:
         """Return the states that the function gives, name -> (T, S); it is called with `BATCH` instants at most."""
         (begun, *inputs), parts = self.arguments_of(instants, horizon), []
@@ -139,9 +168,8 @@ def keyword_numbers(function: SimulateFunction, key: str) -> dict[str, float]:
     except (TypeError, ValueError) as error:
         words = f"{key} must take ({', '.join(ARGUMENTS)}), and numbers by keyword with a value, such as m=1.0"
         raise DocumentError(f"{words}: {error}") from None
-    values = {name: one.default for name, one in taken.parameters.items() if name not in given}
     return {
-        name: float(value)
-        for name, value in values.items()
-        if isinstance(value, int | float) and not isinstance(value, bool)
+        name: float(one.default)
+        for name, one in taken.parameters.items()
+        if name not in given and isinstance(one.default, int | float) and not isinstance(one.default, bool)
     }

@@ -14,7 +14,7 @@ import pandas as pd
 from shipid.arguments import as_names
 from shipid.data.windows import Instants, Windows, from_frame
 from shipid.errors import DataError, DocumentError, ResultError
-from shipid.foundations.faults import PLACES, doubt_of_places
+from shipid.foundations.faults import PLACES, doubt_of_motion
 from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
 from shipid.logs.importing import file_digest
@@ -59,8 +59,13 @@ class PredictionTable(NamedSimulator):
 
     def header(self) -> dict[str, Any]:
         """Return its name, the digest and the name of the file that a folder of results keeps, and what it gives."""
-        kept = f"{self.digest}.parquet"
-        return {"kind": self.kind, "key": self.key, "digest": self.digest, "file": kept, "gives": list(self.gives)}
+        return {
+            "kind": self.kind,
+            "key": self.key,
+            "digest": self.digest,
+            "file": f"{self.digest}.parquet",
+            "gives": list(self.gives),
+        }
 
     def require(self) -> None:
         """Raise DataError where the table was not there when the study was read."""
@@ -89,9 +94,8 @@ class PredictionTable(NamedSimulator):
         """Refuse a table whose rows are not those of the study, and, with a remedy, one that seems to be wrong."""
         file, wanted = Path(self.file), study_keys((training, test), before)
         check_keys(self.frame, wanted, file, " --every")
-        given = self.states(training.instants(), training.horizon, training.step)
-        doubt = doubt_of_places(np.stack([given[name] for name in PLACES], axis=-1), training)
-        if doubt and remedy:
+        states = self.states(training.instants(), training.horizon, training.step)
+        if remedy and (doubt := doubt_of_motion(states, training)):
             raise DataError(f"{doubt}; {remedy}", file=self.file)
         return ()
 

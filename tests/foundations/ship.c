@@ -12,11 +12,13 @@
 #define KNOT (1852.0 / 3600.0)
 
 enum { X, Y, YAW, SURGE, SWAY, RATE, RUDDER, RPM, K_T, X_UU, T_, K_, B_, SURGE_0, RATE_0, YAW_0, FAULT, COUNT };
-/* FAULT, after 5 s: 1 an error, 2 ends the process, 3 hangs, 4 prints and goes on, 5 an error at the start */
+/* FAULT, after 5 s: 1 an error, with its reason if there is a log, 6 a place that is no number, 2 ends the process, 3 hangs, 4 prints and goes on, 5 an error at the start */
 
 typedef struct { double value[COUNT], time; int begun; } Ship;
 
 static const double begin[COUNT] = { [K_T] = 0.02, [X_UU] = 0.003, [T_] = 12.0, [K_] = 0.06, [B_] = 8.0 };
+
+static int logged = 0;
 
 static int start_ship(Ship *s)
 {
@@ -47,7 +49,10 @@ static int step_ship(Ship *s, double h)
     }
     s->time += h;
     if (s->time > 5) switch ((int)x[FAULT]) {
-        case 1: fprintf(stderr, "the shaft is stuck\n"); return 3;
+        case 1:
+            if (logged) printf("the propeller is lost\n"), fflush(stdout);
+            return 3;
+        case 6: x[X] = NAN; break;
         case 2: exit(1);
         case 3: for (;;) continue;
         case 4: for (i = 0; i < 100; ++i) printf("nobody reads this line\n");
@@ -102,7 +107,11 @@ static int free_copy(Ship **kept)
 }
 
 #if FMI == 2
-void *fmi2Instantiate(const char *a, int b, const char *c, const char *d, const void *e, int f, int g) { return new_ship(); }
+void *fmi2Instantiate(const char *a, int b, const char *c, const char *d, const void *e, int f, int g)
+{
+    logged = g;
+    return new_ship();
+}
 void fmi2FreeInstance(void *s) { free(s); }
 int fmi2SetupExperiment(void *s, int a, double b, double c, int d, double e) { return 0; }
 int fmi2EnterInitializationMode(void *s) { return 0; }

@@ -88,7 +88,8 @@ def test_a_ship_without_start_values_runs_along_the_run(folder, version, branche
 
 
 @pytest.mark.parametrize(
-    ("fault", "words"), [(1, "5 s (the shaft is stuck)"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")]
+    ("fault", "words"),
+    [(1, "status 3 (error). at 5 s (the propeller is lost)"), (2, "ends its"), (3, "longer than 1 s"), (5, "Exit")],
 )
 def test_a_failing_ship_is_lost_from_there_on(folder, fault, words):
     """An error keeps what was before; the first window does not take the second one with it."""
@@ -101,6 +102,13 @@ def test_a_failing_ship_is_lost_from_there_on(folder, fault, words):
     assert kept == ([11, 11] if fault == 1 else [0, 0])
     sound = motion_of_ship(states, orders, STEP)
     np.testing.assert_allclose(motion[:, 1:11][:, : kept[0]], sound[:, :10][:, : kept[0]], rtol=0, atol=1e-9)
+
+
+def test_a_place_that_is_no_number_is_named(folder):
+    """In a step response the fault is in the outputs alone: no function of the FMU returns an error."""
+    fmu = as_fmu(write_table(build_ship(folder / "nan.fmu"))).with_values({"fault": 6})
+    with pytest.raises(DocumentError, match=r"fails in a step response: its motion is no number after 5.4 s"):
+        fmu.describe_response(np.array([0, 0, 0, 5.0, 0, 0]), *RESPONSE)
 
 
 def test_what_a_ship_prints_goes_nowhere(folder, capfd):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -115,6 +116,37 @@ def test_a_mistake_of_the_function_is_one_line(tmp_path: Path, name: str, words:
     plan = shipid.read_plan(study_file(tmp_path, FAMILY.format(name)), trust=True)
     with pytest.raises(ShipidError, match=words):
         prepare(plan, obtain_runs(plan))
+
+
+WRONG = """
+import numpy as np
+from my_ship import simulate
+
+def swapped(*given): return simulate(*given)[..., [1, 0, 2, 3, 4, 5]]
+def degrees(*given): return simulate(*given) * [1, 1, 1, 1, 1, 57.3]
+def knots(*given): return simulate(*given) / [1, 1, 1, 0.514, 0.514, 1]
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("swapped", "wrong frame, north and east are exchanged"),
+        ("degrees", "r: heading changes by 0.01.* times the integral of r"),
+        ("knots", "u: place changes by 0.5.* times the integral of u"),
+    ],
+)
+def test_a_wrong_frame_or_unit_of_the_motion_is_refused_unless_meant(tmp_path: Path, name: str, words: str) -> None:
+    family = FAMILY.format(f"wrong:{name}")
+    for more in ("", 'unusual = ["family.mine.predictions"]\n'):
+        plan = shipid.read_plan(study_file(write_wrong(tmp_path), family, more), trust=True)
+        with nullcontext() if more else pytest.raises(DataError, match=words):
+            prepare(plan, obtain_runs(plan))
+
+
+def write_wrong(folder: Path) -> Path:
+    (folder / "wrong.py").write_text(WRONG)
+    return folder
 
 
 def test_code_of_a_document_runs_with_trust_or_from_python(tmp_path: Path, registry: dict[str, Any]) -> None:
