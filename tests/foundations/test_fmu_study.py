@@ -165,6 +165,7 @@ def test_a_ship_that_turns_the_other_way_is_refused(tmp_path):
     turned, key = study_of(tmp_path, {"fmu": table.name, "equal": True}), "family.one.fmu"
     with pytest.raises(DataError, match=rf'acts the other way in the runs.*write unusual = \["{key}"\]') as error:
         prepare(turned, dataset)
-    assert (str(error.value.file), error.value.path) == (str(table), "fmu.rudder.delta")
+    assert str(error.value.file) == str(table)
+    assert error.value.message.startswith("rudder.delta")
     meant = replace(turned, study=turned.study.model_copy(update={"unusual": [key]}))
     assert prepare(meant, dataset).test_paths["one-1"].size

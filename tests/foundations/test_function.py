@@ -138,7 +138,7 @@ def knots(*given): return simulate(*given) / [1, 1, 1, 0.514, 0.514, 1]
 )
 def test_a_wrong_frame_or_unit_of_the_motion_is_refused_unless_meant(tmp_path: Path, name: str, words: str) -> None:
     family = FAMILY.format(f"wrong:{name}")
-    for more in ("", 'unusual = ["family.mine.predictions"]\n'):
+    for more in ("", 'unusual = ["family.mine.function"]\n'):
         plan = shipid.read_plan(study_file(write_wrong(tmp_path), family, more), trust=True)
         with nullcontext() if more else pytest.raises(DataError, match=words):
             prepare(plan, obtain_runs(plan))

@@ -102,7 +102,7 @@ def test_the_structure_that_made_the_data_is_chosen(comparison: StructureCompari
     assert comparison.sentences[0].startswith("structure abkowitz has the least error")
     assert set(comparison.manoeuvres["measure"]) == {"overshoot 1", "overshoot 2", "advance", "tactical diameter"}
     assert (comparison.spread["spread"] >= 0).all()
-    assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in comparison.beyond)
+    assert any("35 deg of helm" in sentence or "deg of drift" in sentence for sentence in comparison.sentences)
 
 
 @pytest.mark.slow
