@@ -87,7 +87,7 @@ def overview_models(content: ReportContent) -> pd.DataFrame:
 def family_words(content: ReportContent, families: Iterable[str]) -> str:
     """What each family of models is, as sentences; empty where that is not known."""
     known = content.models.dropna(subset="description").groupby("family")["description"].first()
-    named = [name for name in dict.fromkeys(families) if name in known.index and name != DATA_DRIVEN]
+    named = [name for name in dict.fromkeys(families) if name != DATA_DRIVEN and known.get(name)]
     return "".join(f" {name}: {known[name]}." for name in named)
 
 

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import pandas as pd
 
 from shipid.report.selection import (
     close_up_models,
     errors_over_seeds,
+    family_words,
     figure_sizes,
     models_by_accuracy,
     spread_items,
@@ -27,3 +30,10 @@ def test_cells_without_result_do_not_enter_the_mean(full_scale):
     means = errors_over_seeds(full_scale)
     assert len(means) == 3
     assert means.H.notna().all()
+
+
+def test_a_family_without_a_description_is_not_described(simulation):
+    """Below the first figure stood `mine: .`, of a simulator of somebody else."""
+    models = simulation.models.assign(description="")
+    models.loc[models["family"] == "high", "description"] = "+-60 %"
+    assert family_words(replace(simulation, models=models), ["moderate", "high"]) == " high: +-60 %."
