@@ -70,7 +70,7 @@ def main() -> None:
 def _move_to_front(words: list[str]) -> list[str]:
     """Move every `--with FILE` and `--with=FILE` before the command: it may stand behind it."""
     pairs = zip(["", *words], words, strict=False)
-    return [word for _, word in sorted(pairs, key=lambda pair: not ("--with" in pair or "--with=" in pair[1]))]
+    return [word for _, word in sorted(pairs, key=lambda pair: not ("--with" in pair or pair[1].startswith("--with=")))]
 
 
 def print_usage_error(error: Any, _: Any = None) -> None:
