@@ -437,12 +437,7 @@ def _spread_segments(problem: Problem) -> tuple[ShootingSegment, ...]:
 
 def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
     """Initial factors (n,) with which the forces explain the measured motion, clipped to the bounds."""
-    unknown, vessel, own = problem.unknown, problem.vessel, len(problem.layout.groups)
-    place = {path: number for number, path in enumerate(vessel.parameters)}
-    spread = np.zeros((len(place), own))
-    for j, group in enumerate(problem.layout.groups):
-        spread[[place[path] for path in group], j] = unknown.scale[j]
-    widths = np.minimum(unknown.prior[:own], LOOSE)
-    factors = fit_forces(vessel, dataset, problem.runs, spread, unknown.centre[:own], widths)
-    factors = np.append(factors, [BEGIN[path] for path in unknown.paths[own:]])
+    unknown, (begin, _) = problem.unknown, _initial_unknowns(problem, None)
+    widths = np.minimum(unknown.prior, LOOSE)
+    factors = fit_forces(problem.vessel, dataset, problem.runs, unknown.values, begin, widths)
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
