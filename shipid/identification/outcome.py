@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -29,11 +28,9 @@ from shipid.identification.bands import (
     Trial,
     band_refusal,
     check_level,
-    data_reach,
-    extrapolation_sentence,
+    extrapolation_sentences,
     measure_bands,
     memory_of_signals,
-    of_log,
     perform_trials,
     residual_spacing,
     select_measures,
@@ -71,7 +68,7 @@ from shipid.identification.statistics import (
 from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.interrupts import hold_interrupts
 from shipid.report.identification import IdentificationContent
-from shipid.simulation.measured import TRIALS
+from shipid.simulation.measured import TRIALS, MeasuredManoeuvre
 from shipid.units import join_names, percent_text, plural_word, significant_digits
 from shipid.version import __version__
 from shipid.vessel.dynamics import vessel_dynamics
@@ -284,10 +281,13 @@ def run_identification(
         identified = vessel.with_values(solution.values)
         pair, flows = {BEFORE: vessel, AFTER: identified}, {AFTER: solution.common_current}
         free = {name: simulate_free_runs(pair, dataset, each, settings, ahead, flows) for name, each in sets.items()}
-        manoeuvres, logs = _compare_manoeuvres(pair)
+        manoeuvres, done = _compare_manoeuvres(pair)
         refused = "" if band is None else band_refusal(solution, judged)
         if band is not None and not refused:
-            perform = partial(select_measures, trials=_standard_trials(), shown=COMPARED)
+
+            def perform(ship: Vessel) -> dict[str, dict[str, float]]:
+                return select_measures(perform_trials(ship, _standard_trials())[0], COMPARED)
+
             ends = measure_bands(vessel, solution, judged, perform, band)
             ends = ends[["manoeuvre", "measure", "low", "high"]]
             manoeuvres = manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"])
@@ -296,7 +296,6 @@ def run_identification(
         outputs = _compare_outputs(pair, solution, dataset, fitted)
         if programme:
             ranked, lacking = _next_manoeuvres(identified, dataset, fitted, solution, judged)
-        reach = data_reach(vessel, dataset, fitted)
         warnings = (
             *shared,
             *solution.warnings,
@@ -347,9 +346,7 @@ def run_identification(
             curves=curves,
             profiles=pd.concat([pd.DataFrame(), *map(profile_table, curves)], ignore_index=True),
             warnings=tuple(filter(None, warnings)),
-            beyond=tuple(
-                filter(None, (extrapolation_sentence(title, of_log(identified, log), reach) for title, log in logs))
-            ),
+            beyond=extrapolation_sentences(identified, done, dataset, fitted),
             outputs=outputs,
         )
 
@@ -487,8 +484,8 @@ def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> p
     return pd.DataFrame(rows)
 
 
-def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, list[tuple[str, pd.DataFrame]]]:
-    """Manoeuvre measures of both vessels, and the logs of the last vessel by title.
+def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, dict[str, MeasuredManoeuvre]]:
+    """Manoeuvre measures of both vessels, and by title what the last vessel performed.
 
     Where a vessel cannot perform one: NaN, and the reason in `note`.
     """
@@ -515,7 +512,7 @@ def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, list[
     frame = pd.DataFrame(rows, columns=["manoeuvre", "measure", "unit", *pair, "note"]).astype(
         dict.fromkeys(pair, float)
     )
-    return frame.fillna({"unit": ""}), [(title, one.frame) for title, one in each[AFTER][0].items()]
+    return frame.fillna({"unit": ""}), each[AFTER][0]
 
 
 def _standard_trials() -> dict[str, Trial]:
