@@ -144,8 +144,7 @@ def principal_axes(covariance: Array) -> Array:
     """Principal axes (n, k) of a covariance (n, n), each as long as its standard deviation; tiny ones are left out."""
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
     kept = values > SMALL**2 * max(float(values.max(initial=0.0)), 1e-300)
-    axes: Array = vectors[:, kept] * np.sqrt(values[kept])
-    return axes
+    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
 
 @dataclass(frozen=True)

@@ -83,6 +83,9 @@ ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviati
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
 TRIED = tuple(sorted(TRIALS, key=lambda trial: trial[0] == "turning"))
 """Standard manoeuvres [deg] that both vessels perform in calm water: those that have criteria, turning last."""
+STARBOARD_TRIALS: dict[str, Trial] = {
+    f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}": (kind, angles, "starboard") for kind, angles in TRIED
+}
 COMPARED = {
     "zigzag": ("overshoot 1", "overshoot 2", "initial turning", "period"),
     "turning": ("advance", "transfer", "tactical diameter", "steady diameter", "steady speed"),
@@ -286,11 +289,12 @@ def run_identification(
         if band is not None and not refused:
 
             def perform(ship: Vessel) -> dict[str, dict[str, float]]:
-                return select_measures(perform_trials(ship, _standard_trials())[0], COMPARED)
+                return select_measures(perform_trials(ship, STARBOARD_TRIALS)[0], COMPARED)
 
             ends = measure_bands(vessel, solution, judged, perform, band)
-            ends = ends[["manoeuvre", "measure", "low", "high"]]
-            manoeuvres = manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"])
+            manoeuvres = manoeuvres.merge(
+                ends[["manoeuvre", "measure", "low", "high"]], how="left", on=["manoeuvre", "measure"]
+            )
         curved = curvature_warning(solution, dataset, judged, determined)
         _go_on(held)
         outputs = _compare_outputs(pair, solution, dataset, fitted)
@@ -489,9 +493,9 @@ def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, dict[
 
     Where a vessel cannot perform one: NaN, and the reason in `note`.
     """
-    trials, rows = _standard_trials(), list[dict[str, Any]]()
-    each = {name: perform_trials(vessel, trials) for name, vessel in pair.items()}
-    for title, (kind, *_) in trials.items():
+    rows = list[dict[str, Any]]()
+    each = {name: perform_trials(vessel, STARBOARD_TRIALS) for name, vessel in pair.items()}
+    for title, (kind, *_) in STARBOARD_TRIALS.items():
         said = [f"{name}: {refused[title]}" for name, (_, refused) in each.items() if title in refused]
         if len(said) == len(pair):
             why = {refused[title] for _, refused in each.values()}
@@ -515,14 +519,9 @@ def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, dict[
     return frame.fillna({"unit": ""}), each[AFTER][0]
 
 
-def _standard_trials() -> dict[str, Trial]:
-    titles = [f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}" for kind, angles in TRIED]
-    return {title: (kind, angles, "starboard") for title, (kind, angles) in zip(titles, TRIED, strict=True)}
-
-
 def _longest_run(solution: Solution) -> float:
-    each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
-    return max(float(np.ptp(times)) for times in each)
+    """Time from the first to the last residual of the run where it is longest [s]."""
+    return max(float(np.ptp(solution.times[solution.clusters == run])) for run in np.unique(solution.clusters))
 
 
 def _whiteness_table(solution: Solution) -> pd.DataFrame:
