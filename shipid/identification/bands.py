@@ -56,14 +56,15 @@ def perform_trials(vessel: Vessel, trials: Mapping[str, Trial]) -> tuple[dict[st
 
 
 def select_measures(
-    vessel: Vessel, trials: Mapping[str, Trial], shown: Mapping[str, Sequence[str]]
+    done: Mapping[str, MeasuredManoeuvre], shown: Mapping[str, Sequence[str]]
 ) -> dict[str, dict[str, float]]:
-    """Title of each trial that the vessel can perform -> measure -> value. shown : kind of a trial -> measures."""
-    done, _ = perform_trials(vessel, trials)
-    rows = {
-        title: [row for row in one.measures if row["measure"] in shown[trials[title][0]]] for title, one in done.items()
+    """Title of each manoeuvre performed -> measure -> value. shown : kind of a manoeuvre -> measures."""
+    return {
+        title: {
+            row["measure"]: float(row["value"]) for row in one.measures if row["measure"] in shown[one.standard.kind]
+        }
+        for title, one in done.items()
     }
-    return {title: {row["measure"]: float(row["value"]) for row in measures} for title, measures in rows.items()}
 
 
 def check_level(level: float | None) -> None:
@@ -143,8 +144,7 @@ def principal_axes(covariance: Array) -> Array:
     """Principal axes (n, k) of a covariance (n, n), each as long as its standard deviation; tiny ones are left out."""
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
     kept = values > SMALL**2 * max(float(values.max(initial=0.0)), 1e-300)
-    axes: Array = vectors[:, kept] * np.sqrt(values[kept])
-    return axes
+    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
 
 @dataclass(frozen=True)
@@ -177,9 +177,8 @@ class Reach:
 
 def data_reach(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Reach:
     """Reach of the runs of a dataset."""
-    rows = dataset.frame[dataset.frame["run"].isin(runs)]
     names = ["u", "v", "r", *vessel_dynamics(vessel).commands]
-    rows = rows[names].dropna()
+    rows = dataset.frame.loc[dataset.frame["run"].isin(runs), names].dropna()
     return Reach.of(vessel, {name: rows[name].to_numpy() for name in names}, ORDINARY)
 
 
@@ -195,6 +194,15 @@ def extrapolation_sentence(title: str, one: Reach, data: Reach) -> str:
     if not far:
         return ""
     return f"{title} reaches {join_names([a for a, _ in far])}; the data reach {join_names([b for _, b in far])}"
+
+
+def extrapolation_sentences(
+    vessel: Vessel, done: Mapping[str, MeasuredManoeuvre], dataset: Dataset, runs: Sequence[str]
+) -> tuple[str, ...]:
+    """A sentence on each manoeuvre performed, by title, that goes beyond the runs of a dataset."""
+    data = data_reach(vessel, dataset, runs)
+    said = (extrapolation_sentence(title, of_log(vessel, one.frame), data) for title, one in done.items())
+    return tuple(filter(None, said))
 
 
 def of_log(vessel: Vessel, frame: pd.DataFrame) -> Reach:

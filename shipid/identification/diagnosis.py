@@ -48,7 +48,7 @@ makes them err is seen on the log with its noise once more.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise, product
@@ -76,6 +76,8 @@ from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Steps = NDArray[np.integer[Any]]
+SetNumbers = Callable[[Array], Mapping[str, float]]
+"""Factors (n,) -> path -> parameter of the vessel [SI]."""
 NONE, UNCLEAR = "none", "cannot tell"
 LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
 CHANGES = 0.5  # share of the rows with a change: from there on a command is measured, below it is an order
@@ -87,7 +89,8 @@ EXACT = 0.01  # of the size of the terms: what no resampled log says better
 SHORTEST, AHEAD = 40, 80  # steps of a stretch; of a predicted path, 5 ship lengths where the runs are long enough
 FOLDS, BLOCK = 4, 4  # parts of the log left out in turn; bumps of a block
 ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
-MOST_FORCES = 20  # evaluations of a fit of the forces alone
+MOST_FORCES, WEIGHINGS = 20, 3  # evaluations of a fit of the forces alone with the same weights; such fits
+CALM = 1e-3  # of SMOOTH: the least smoothing where forces are fitted, which SMOOTH would bias without noise
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
 PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics alone are judged
 MOST_SIZES = 2  # that a sentence names
@@ -153,7 +156,7 @@ class _Log:
     """A log at equal steps with its bumps, and the residuals of any change of it by kinematics alone."""
 
     length: float | None = None
-    plain = PLAIN
+    plain, calm = PLAIN, 1.0
     commands: tuple[str, ...] = ()
     environment: Mapping[str, float] = MappingProxyType({})
     numbers: tuple[float, ...] = ()
@@ -262,7 +265,7 @@ class _Log:
         u, v, r, psi, north, east = (share * np.median([*map(white_noise_of, series[name])]) for name in STATES)
         sizes = (np.sqrt(np.mean(self.motion.columns[name] ** 2)) for name in ("u", "v", "r"))
         rough = max(noise / max(size, 1e-12) for noise, size in zip((u, v, r), sizes, strict=True))
-        self.smooth = SMOOTH * float(np.clip(rough / NOISY, 1.0, 3.0))
+        self.smooth = SMOOTH * float(np.clip(rough / NOISY, self.calm, 3.0))
         pulled, summed = (float(np.linalg.norm(one)) for one in (self.pull, self.phi))
         speed, passing = self.scales.speed, self.scales.passing
         terms = np.array([speed / passing, speed / passing, 1 / passing**2, 1 / passing, speed, speed])
@@ -408,11 +411,18 @@ class _VesselLog(_Log):
     _kept: tuple[Array, Array] | None = None
     plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
-    def __init__(self, vessel: Vessel, dataset: Dataset, runs: Sequence[str], environment: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        vessel: Vessel,
+        dataset: Dataset,
+        runs: Sequence[str],
+        environment: Mapping[str, float],
+        calm: float = 1.0,
+    ) -> None:
         if "current" not in vessel.document:
             vessel = vessel.with_values({"current.kind": "uniform"})
         self.vessel, self.model = vessel, vessel_dynamics(vessel)
-        self.length, self.commands = vessel.length, self.model.commands
+        self.length, self.commands, self.calm = vessel.length, self.model.commands, calm
         self.environment = {name: environment.get(name, 0.0) for name in self.model.environment}
         self.numbers = tuple(vessel.parameters.values())
         for missing in (name for name in self.commands if name not in dataset.commands):
@@ -551,21 +561,27 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
 
 
 def fit_forces(
-    vessel: Vessel, dataset: Dataset, runs: Sequence[str], spread: Array, centre: Array, widths: Array
+    vessel: Vessel, dataset: Dataset, runs: Sequence[str], values: SetNumbers, centre: Array, widths: Array
 ) -> Array:
     """Factors (n,) with which the forces explain the motion of the runs, by least squares over the bumps.
 
-    spread : (P, n) change of each parameter of the vessel [SI] by each factor, from their `centre` (n,) on.
-    widths : (n,) prior standard deviation of each factor. Raises DataError for runs too short for a bump.
+    Each equation weighs as much as the residuals that the factors so far leave in it allow, as in `diagnose`.
+    values : parameters by factors. centre, widths : (n,) means and standard deviations of the prior of each factor.
+    Raises DataError for runs too short for a bump.
     """
-    log = _VesselLog(vessel, dataset, runs, {})
-    weight = log.weights(log.residuals(log.motion))[:3, None]
+    log, factors = _VesselLog(vessel, dataset, runs, {}, calm=CALM), centre
 
-    def misfit(factors: Array) -> Array:
-        moved = replace(log.motion, parameters=log.motion.parameters + spread @ (factors - centre))
-        return np.append(weight * log.residuals(moved)[:3], (factors - centre) / widths)
+    def residuals(factors: Array) -> Array:
+        numbers = {**log.vessel.parameters, **values(factors)}
+        return log.residuals(replace(log.motion, parameters=np.array(list(numbers.values()))))
 
-    return np.asarray(least_squares(misfit, centre, max_nfev=MOST_FORCES).x)
+    def misfit(factors: Array, weight: Array) -> Array:
+        return np.append(weight * residuals(factors)[:3], (factors - centre) / widths)
+
+    for _ in range(WEIGHINGS):
+        weight = log.weights(residuals(factors))[:3, None]
+        factors = np.asarray(least_squares(misfit, factors, max_nfev=MOST_FORCES, args=(weight,)).x)
+    return factors
 
 
 def diagnose(

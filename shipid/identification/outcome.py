@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -29,11 +28,9 @@ from shipid.identification.bands import (
     Trial,
     band_refusal,
     check_level,
-    data_reach,
-    extrapolation_sentence,
+    extrapolation_sentences,
     measure_bands,
     memory_of_signals,
-    of_log,
     perform_trials,
     residual_spacing,
     select_measures,
@@ -71,7 +68,7 @@ from shipid.identification.statistics import (
 from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.interrupts import hold_interrupts
 from shipid.report.identification import IdentificationContent
-from shipid.simulation.measured import TRIALS
+from shipid.simulation.measured import TRIALS, MeasuredManoeuvre
 from shipid.units import join_names, percent_text, plural_word, significant_digits
 from shipid.version import __version__
 from shipid.vessel.dynamics import vessel_dynamics
@@ -86,6 +83,9 @@ ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviati
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
 TRIED = tuple(sorted(TRIALS, key=lambda trial: trial[0] == "turning"))
 """Standard manoeuvres [deg] that both vessels perform in calm water: those that have criteria, turning last."""
+STARBOARD_TRIALS: dict[str, Trial] = {
+    f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}": (kind, angles, "starboard") for kind, angles in TRIED
+}
 COMPARED = {
     "zigzag": ("overshoot 1", "overshoot 2", "initial turning", "period"),
     "turning": ("advance", "transfer", "tactical diameter", "steady diameter", "steady speed"),
@@ -284,19 +284,22 @@ def run_identification(
         identified = vessel.with_values(solution.values)
         pair, flows = {BEFORE: vessel, AFTER: identified}, {AFTER: solution.common_current}
         free = {name: simulate_free_runs(pair, dataset, each, settings, ahead, flows) for name, each in sets.items()}
-        manoeuvres, logs = _compare_manoeuvres(pair)
+        manoeuvres, done = _compare_manoeuvres(pair)
         refused = "" if band is None else band_refusal(solution, judged)
         if band is not None and not refused:
-            perform = partial(select_measures, trials=_standard_trials(), shown=COMPARED)
+
+            def perform(ship: Vessel) -> dict[str, dict[str, float]]:
+                return select_measures(perform_trials(ship, STARBOARD_TRIALS)[0], COMPARED)
+
             ends = measure_bands(vessel, solution, judged, perform, band)
-            ends = ends[["manoeuvre", "measure", "low", "high"]]
-            manoeuvres = manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"])
+            manoeuvres = manoeuvres.merge(
+                ends[["manoeuvre", "measure", "low", "high"]], how="left", on=["manoeuvre", "measure"]
+            )
         curved = curvature_warning(solution, dataset, judged, determined)
         _go_on(held)
         outputs = _compare_outputs(pair, solution, dataset, fitted)
         if programme:
             ranked, lacking = _next_manoeuvres(identified, dataset, fitted, solution, judged)
-        reach = data_reach(vessel, dataset, fitted)
         warnings = (
             *shared,
             *solution.warnings,
@@ -347,9 +350,7 @@ def run_identification(
             curves=curves,
             profiles=pd.concat([pd.DataFrame(), *map(profile_table, curves)], ignore_index=True),
             warnings=tuple(filter(None, warnings)),
-            beyond=tuple(
-                filter(None, (extrapolation_sentence(title, of_log(identified, log), reach) for title, log in logs))
-            ),
+            beyond=extrapolation_sentences(identified, done, dataset, fitted),
             outputs=outputs,
         )
 
@@ -487,14 +488,14 @@ def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> p
     return pd.DataFrame(rows)
 
 
-def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, list[tuple[str, pd.DataFrame]]]:
-    """Manoeuvre measures of both vessels, and the logs of the last vessel by title.
+def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, dict[str, MeasuredManoeuvre]]:
+    """Manoeuvre measures of both vessels, and by title what the last vessel performed.
 
     Where a vessel cannot perform one: NaN, and the reason in `note`.
     """
-    trials, rows = _standard_trials(), list[dict[str, Any]]()
-    each = {name: perform_trials(vessel, trials) for name, vessel in pair.items()}
-    for title, (kind, *_) in trials.items():
+    rows = list[dict[str, Any]]()
+    each = {name: perform_trials(vessel, STARBOARD_TRIALS) for name, vessel in pair.items()}
+    for title, (kind, *_) in STARBOARD_TRIALS.items():
         said = [f"{name}: {refused[title]}" for name, (_, refused) in each.items() if title in refused]
         if len(said) == len(pair):
             why = {refused[title] for _, refused in each.values()}
@@ -515,17 +516,12 @@ def _compare_manoeuvres(pair: Mapping[str, Vessel]) -> tuple[pd.DataFrame, list[
     frame = pd.DataFrame(rows, columns=["manoeuvre", "measure", "unit", *pair, "note"]).astype(
         dict.fromkeys(pair, float)
     )
-    return frame.fillna({"unit": ""}), [(title, one.frame) for title, one in each[AFTER][0].items()]
-
-
-def _standard_trials() -> dict[str, Trial]:
-    titles = [f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}" for kind, angles in TRIED]
-    return {title: (kind, angles, "starboard") for title, (kind, angles) in zip(titles, TRIED, strict=True)}
+    return frame.fillna({"unit": ""}), each[AFTER][0]
 
 
 def _longest_run(solution: Solution) -> float:
-    each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
-    return max(float(np.ptp(times)) for times in each)
+    """Time from the first to the last residual of the run where it is longest [s]."""
+    return max(float(np.ptp(solution.times[solution.clusters == run])) for run in np.unique(solution.clusters))
 
 
 def _whiteness_table(solution: Solution) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
@@ -33,6 +34,7 @@ from shipid.identification.settings import (
     ENVIRONMENT,
     NUISANCES,
     Identify,
+    resolve_overrides,
     run_overrides,
     weighted_columns,
 )
@@ -436,13 +438,15 @@ def _spread_segments(problem: Problem) -> tuple[ShootingSegment, ...]:
 
 
 def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
-    """Initial factors (n,) with which the forces explain the measured motion, clipped to the bounds."""
-    unknown, vessel, own = problem.unknown, problem.vessel, len(problem.layout.groups)
-    place = {path: number for number, path in enumerate(vessel.parameters)}
-    spread = np.zeros((len(place), own))
-    for j, group in enumerate(problem.layout.groups):
-        spread[[place[path] for path in group], j] = unknown.scale[j]
-    widths = np.minimum(unknown.prior[:own], LOOSE)
-    factors = fit_forces(vessel, dataset, problem.runs, spread, unknown.centre[:own], widths)
-    factors = np.append(factors, [BEGIN[path] for path in unknown.paths[own:]])
+    """Initial factors (n,) with which forces in the weather of each run explain its motion, within the bounds."""
+    unknown, vessel, frame = problem.unknown, problem.vessel, dataset.frame
+    channels = problem.layout.model.environment
+    given = pd.DataFrame(resolve_overrides(problem.settings, problem.runs, vessel, channels, dataset.runs)).T
+    weather = {
+        name: frame["run"].map(given[path]).fillna(frame.get(name, 0.0))
+        for name in channels
+        if (path := f"{ENVIRONMENT}.{name}") in given
+    }
+    log, begin = replace(dataset, frame=frame.assign(**weather)), _initial_unknowns(problem, None)[0]
+    factors = fit_forces(vessel, log, problem.runs, unknown.values, begin, np.minimum(unknown.prior, LOOSE))
     return np.asarray(np.clip(factors, unknown.low, unknown.high))

@@ -68,7 +68,7 @@ class LinearFit:
     paths, factors : name and estimate (n,) of each factor on the base values; the name of a tied group is its first
     path. centre : (n,) of the base: 0 where that is 0.
     residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
-    time. With huber those of `Prediction.marginal`.
+    time. With huber those of `ResidualPrediction.marginal`.
     jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
     clusters, signals : (m,) number of the run and column of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.

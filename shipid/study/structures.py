@@ -24,14 +24,11 @@ from shipid.errors import DataError, ShipidError
 from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
 from shipid.identification.bands import (
-    Reach,
     Trial,
     band_refusal,
     check_level,
-    data_reach,
-    extrapolation_sentence,
+    extrapolation_sentences,
     measure_bands,
-    of_log,
     perform_trials,
     select_measures,
 )
@@ -49,6 +46,7 @@ from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
 from shipid.report.structures import StructuresContent
+from shipid.simulation.measured import MeasuredManoeuvre
 from shipid.study.new import proposed_horizon
 from shipid.study.survey import survey_dataset
 from shipid.version import __version__
@@ -182,8 +180,8 @@ def compare_structures(
     chosen = str(table["structure"].iloc[0])
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]
     report("standard manoeuvres")
-    reach = data_reach(vessel, dataset, fitted)
-    manoeuvres, far = _manoeuvre_table(fits, chosen, reach, equal, level)
+    manoeuvres, done = _manoeuvre_table(fits, chosen, equal, level)
+    far = extrapolation_sentences(fits[chosen].vessel, done, dataset, fitted)
     silent = uninformative_structures(manoeuvres)
     for name in silent.keys() - {chosen}:
         table.loc[table["structure"] == name, ["equal", "note"]] = False, silent[name]
@@ -389,32 +387,29 @@ STANDARD_TRIALS: dict[str, Trial] = {
 
 
 def _manoeuvre_table(
-    fits: Mapping[str, FittedStructure], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
-) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one extrapolates."""
+    fits: Mapping[str, FittedStructure], chosen: str, equal: Sequence[str], level: float | None
+) -> tuple[pd.DataFrame, dict[str, MeasuredManoeuvre]]:
+    """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one performed."""
 
     def perform(vessel: Vessel) -> dict[str, dict[str, float]]:
-        return select_measures(with_actuators_on(vessel), STANDARD_TRIALS, MEASURES_SHOWN)
+        return select_measures(perform_trials(with_actuators_on(vessel), STANDARD_TRIALS)[0], MEASURES_SHOWN)
 
-    rows, far = list[dict[str, Any]](), list[str]()
-    for name, fit in fits.items():
-        done, refused = perform_trials(with_actuators_on(fit.vessel), STANDARD_TRIALS)
-        refused = refused if done else {"all": next(iter(refused.values()))}
+    rows = list[dict[str, Any]]()
+    each = {name: perform_trials(with_actuators_on(fit.vessel), STANDARD_TRIALS) for name, fit in fits.items()}
+    for name, (done, refused) in each.items():
+        fit, notes = fits[name], refused if done else {"all": next(iter(refused.values()))}
         units = {row["measure"]: row["unit"] for one in done.values() for row in one.measures}
-        if name == chosen:
-            far += [extrapolation_sentence(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
         frames: list[Any] = [
-            {"manoeuvre": title, **{key: row[key] for key in ("measure", "value")}}
-            for title, one in done.items()
-            for row in one.measures
-            if row["measure"] in MEASURES_SHOWN[one.standard.kind]
+            {"manoeuvre": title, "measure": measure, "value": value}
+            for title, measures in select_measures(done, MEASURES_SHOWN).items()
+            for measure, value in measures.items()
         ]
         if level is not None and name in equal:
             frames = measure_bands(fit.solution.vessel, fit.solution, fit.statistics, perform, level).to_dict("records")
-        frames += [{"manoeuvre": title, "measure": "", "note": note} for title, note in refused.items()]
+        frames += [{"manoeuvre": title, "measure": "", "note": note} for title, note in notes.items()]
         rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]
     columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
-    return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
+    return pd.DataFrame(rows, columns=columns), each[chosen][0]
 
 
 def uninformative_structures(manoeuvres: pd.DataFrame) -> dict[str, str]:

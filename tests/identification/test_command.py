@@ -40,7 +40,7 @@ def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "STARBOARD_TRIALS", {"zigzag 10/10": ("zigzag", (10, 10), "starboard")})
     monkeypatch.setattr(outcome.design, "candidate_manoeuvres", lambda *_: candidate_manoeuvres(SHIP, [3.0])[8:])
     text = output_of(
         *("identify", "gunnerus-28.9", file, "--parameters", f"{ONE}, hull.derivatives.N_uv"),
@@ -65,7 +65,7 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monke
 
 
 def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "STARBOARD_TRIALS", {"zigzag 10/10": ("zigzag", (10, 10), "starboard")})
     monkeypatch.setattr(command, "_diagnose_first", lambda *_: None)
     Path("settings.toml").write_text(f'[identify]\nparameters = ["{ONE}"]\nhorizon = 30\nmethod = "euler"\n')
     output_of("identify", "gunnerus-28.9", file, "--settings", "settings.toml", "--horizon", 20, "--out", "a.toml")
@@ -76,7 +76,7 @@ def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.
 
 def test_programs_get_how_the_fit_ended_and_whose_errors_it_has(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As the text says: the sentence, the residuals, and by what the standard errors are."""
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "STARBOARD_TRIALS", {"zigzag 10/10": ("zigzag", (10, 10), "starboard")})
     monkeypatch.setattr(command, "_diagnose_first", lambda *_: None)
     how = ("--parameters", ONE, "--horizon", "20", "--out", "b.toml", "--json")
     said = json.loads(CliRunner().invoke(app, ["identify", "gunnerus-28.9", str(file), *how]).stdout)

@@ -179,7 +179,9 @@ def test_what_a_current_takes_away_is_not_known_of_the_numbers(monkeypatch: pyte
 
 @pytest.mark.parametrize("more", [{}, {"nuisance": {"current": 0.05}}])
 def test_only_a_prior_of_a_current_that_is_named_is_contradicted(monkeypatch: pytest.MonkeyPatch, more: dict) -> None:
-    monkeypatch.setattr("shipid.identification.outcome.TRIED", [("turning", [35.0])])
+    monkeypatch.setattr(
+        "shipid.identification.outcome.STARBOARD_TRIALS", {"turning 35": ("turning", (35,), "starboard")}
+    )
     log = log_of(1, np.tile([1.8, 0.0], (6, 1)))
     said = " ".join(run_identification(SHIP, log, Identify(**HOW, current="one", **more), log.runs).warnings)
     assert ("current_north would be 1.8 +- 0.0" in said) is bool(more)

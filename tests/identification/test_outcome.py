@@ -55,7 +55,7 @@ def settings(**more: object) -> Identify:
 @pytest.fixture
 def one_manoeuvre(monkeypatch: pytest.MonkeyPatch) -> None:
     """Vessels perform one manoeuvre, where the manoeuvres are not the point."""
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "STARBOARD_TRIALS", {"zigzag 10/10": ("zigzag", (10, 10), "starboard")})
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_measures_before_and_after_are_those_of_the_vessels(
 ) -> None:
     table = identified.manoeuvres
     assert set(table["manoeuvre"]) == {"zigzag 10/10", "zigzag 20/20", "turning 35"}
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "STARBOARD_TRIALS", {"zigzag 10/10": ("zigzag", (10, 10), "starboard")})
     truth = outcome._compare_manoeuvres({BEFORE: off(), AFTER: SHIP})[0]
     both = table[: len(truth)]
     assert list(both["measure"]) == list(truth["measure"])
@@ -222,7 +222,7 @@ def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
             raise ShipidError("she diverges")
         return every(vessel, choice, *args, **how)
 
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome, "STARBOARD_TRIALS", {"zigzag 10/10": ("zigzag", (10, 10), "starboard")})
     monkeypatch.setattr(outcome.design, "candidate_manoeuvres", lambda *_: some)
     monkeypatch.setattr(outcome.design, "information_of_candidates", informed)
     done = run_identification(off(), log.select(["M01", "M02"]), settings(parameters=FEW[:1]), programme=True)

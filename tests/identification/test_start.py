@@ -65,10 +65,10 @@ def test_inverse_dynamics_keeps_within_the_bounds() -> None:
 
 
 @cache
-def turning_log(noise: float = 0.0) -> Dataset:
+def turning_log(noise: float = 0.0, wind: tuple[float, float] = (0.0, 6.0)) -> Dataset:
     """Eight manoeuvres of a minute, rows at 5 Hz with noise of u and v [m/s], and of r a tenth of it [rad/s]."""
-    orders = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}
-    wanted = Truth(vessel=SHIP.key, manoeuvres=8, duration=60, step=0.05, interval=0.2, manoeuvre=[orders])
+    orders, times = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}, {"step": 0.05, "interval": 0.2}
+    wanted = Truth(vessel=SHIP.key, manoeuvres=8, duration=60, **times, wind_speed=wind, manoeuvre=[orders])
     frame, rng = simulate_truth(wanted, SHIP), np.random.default_rng(0)
     sizes = {"u": noise, "v": noise, "r": 0.1 * noise, "psi": 0.1 * noise, "north": 15 * noise, "east": 15 * noise}
     noisy = {name: frame[name] + rng.normal(0, size, len(frame)) for name, size in sizes.items()}
@@ -86,20 +86,31 @@ def objective(problem: Problem, factors: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_forces_lead_near_the_truth_also_of_numbers_in_which_they_are_not_linear(seed: int) -> None:
+def test_forces_give_the_truth_also_of_numbers_in_which_they_are_not_linear(seed: int) -> None:
     """Both propellers share one factor of their diameter; thrust goes with its fourth power and more."""
     draw, paths = np.random.default_rng(seed), (*MAIN, PORT, STARBOARD)
     factors = np.append(draw.uniform(0.7, 1.3, len(MAIN)), 2 * [draw.uniform(0.8, 1.2)])
     base = SHIP.with_values({path: SHIP.parameters[path] / x for path, x in zip(paths, factors, strict=True)})
     problem, start = first_guess(base, turning_log(), parameters=paths, together=[[PORT, STARBOARD]])
-    assert start[-1] == pytest.approx(factors[-1], rel=0.02)
-    assert objective(problem, start) < 0.01 * objective(problem, np.ones(len(start)))
+    np.testing.assert_allclose(start, factors[:-1], rtol=5e-3)
+    assert objective(problem, start) < 1e-6 * objective(problem, np.ones(len(start)))
 
 
 def test_forces_give_a_derivative_that_the_base_lacks() -> None:
     base = SHIP.with_values({MAIN[4]: 0.0})
     _, start = first_guess(base, turning_log(), parameters=MAIN[4:5], scale={MAIN[4]: 1e6})
-    assert start[0] * 1e6 == pytest.approx(SHIP.parameters[MAIN[4]], rel=0.1)
+    assert start[0] * 1e6 == pytest.approx(SHIP.parameters[MAIN[4]], rel=1e-3)
+
+
+def test_the_wind_of_a_run_may_be_logged_or_given() -> None:
+    """Without the wind of the runs that lack it these factors were up to 2.5 times the truth."""
+    rows, names = turning_log(wind=(8.0, 15.0)).frame, ["V_w", "beta_w"]
+    given = rows.groupby("run")[names].first().iloc[::2]
+    still = rows.assign(**{name: rows[name].mask(rows["run"].isin(given.index), 0.0) for name in names})
+    _, start = first_guess(
+        SHIP, Dataset(still, {}), runs={run: {"environment": dict(row)} for run, row in given.iterrows()}
+    )
+    np.testing.assert_allclose(start, 1, rtol=5e-3)
 
 
 def test_what_forces_do_not_show_stays_at_the_base_and_priors_hold() -> None:
@@ -114,9 +125,9 @@ def test_what_forces_do_not_show_stays_at_the_base_and_priors_hold() -> None:
 def test_noise_is_averaged_and_a_start_can_be_simulated() -> None:
     """0.1 m/s at 5 Hz would be an acceleration noise of 0.7 m/s^2; Y_v|r| and Y_r|v| do the same."""
     log, pair = turning_log(0.1), ["hull.derivatives.Y_v|r|", "hull.derivatives.Y_r|v|"]
-    assert np.abs(first_guess(SHIP, log, parameters=pair)[1] - 1).max() < 0.5
+    assert np.abs(first_guess(SHIP, log, parameters=pair)[1] - 1).max() < 0.1
     _, start = first_guess(SHIP.with_values({MAIN[4]: 0.7 * SHIP.parameters[MAIN[4]]}), log, parameters=[MAIN[4]])
-    assert start[0] == pytest.approx(1 / 0.7, rel=0.2)
+    assert start[0] == pytest.approx(1 / 0.7, rel=0.05)
 
 
 def test_runs_too_short_for_a_bump_are_reported() -> None:
