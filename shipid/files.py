@@ -12,9 +12,6 @@ import socket
 import stat
 import tempfile
 import time
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -31,8 +28,6 @@ TEMPORARY = ".shipid-"
 """Beginning of the names of temporary folders."""
 TABLES = (".parquet", ".csv")
 """Endings of the files that `write_table` writes."""
-# The header of an array is a piece of Python: the last two.
-_NOT_WHOLE = (zipfile.BadZipFile, zlib.error, EOFError, tokenize.TokenError, SyntaxError)
 _SWEPT: set[Path] = set()  # folders that this process has looked through: one of 10,000 files takes milliseconds
 _KNOWN: set[Path] = set()  # folders in which this process has written
 
@@ -250,11 +245,12 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
     """
     import numpy as np
 
-    try:
-        with open_file(file) as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
-    except (*_NOT_WHOLE, TypeError, AttributeError, NotImplementedError) as error:  # the last: a foreign compression
-        raise ValueError(f"{file} is not a whole .npz") from error
+    with open_file(file) as stream:
+        try:
+            with np.load(stream, allow_pickle=False) as stored:
+                return {name: stored[name] for name in stored.files if name.startswith(beginnings or "")}
+        except Exception as error:  # of the archive, its compression or the header of an array: any of a dozen
+            raise ValueError(f"{file} is not a whole .npz: {error}") from error
 
 
 def arrays_with_prefix(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:

@@ -82,6 +82,13 @@ def rows_by_name(names: Sequence[str], values: MX, *shape: int) -> dict[str, Any
     return {name: ca.ArrayInterface.MX(row.T, shape=shape or row.T.shape) for name, row in rows}
 
 
+def change_arrays(instants: Instants, change: Callable[[Any], Any]) -> Instants:
+    """Instants with other arrays, or symbols, in place of each array, in order."""
+    groups = instants.columns, instants.past, instants.planned, instants.hidden, instants.estimates
+    changed: Any = (group and {name: change(one) for name, one in group.items()} for group in groups)
+    return Instants(*changed)
+
+
 @dataclass(frozen=True)
 class SymbolicPhysics(Physics):
     """Physics whose instants hold symbols, of one instant."""
@@ -155,14 +162,14 @@ class SymbolicPhysics(Physics):
         made: list[tuple[ca.Function, dict[str, tuple[int, ...]]]] = []
 
         def call(at: Instants, *arrays: Any) -> dict[str, Any]:
-            groups = at.columns, at.past, at.hidden or {}
-            given = [*(value for group in groups for value in group.values()), *arrays]
+            given = list[Any]()
+            change_arrays(at, given.append)
+            given += arrays
             if not made:
                 symbols = [MX.sym("given", value.size) for value in given]
                 pairs = zip(symbols, given, strict=True)
                 shaped = (ca.ArrayInterface.MX(symbol, shape=value.shape) for symbol, value in pairs)
-                columns, past, hidden = [dict[str, Any](zip(group, shaped, strict=False)) for group in groups]
-                results = function(Instants(columns, past, hidden=hidden or None), *shaped)
+                results = function(change_arrays(at, lambda _: next(shaped)), *shaped)
                 flat = [MX(value.reshape(-1)) for value in results.values()]
                 made.append((ca.Function("advance", symbols, flat), {key: one.shape for key, one in results.items()}))
             one, shapes = made[0]

@@ -14,7 +14,7 @@ from shipid.errors import ShipidError
 from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_band_promised
 from shipid.export.correctors import symbolic_corrector
 from shipid.export.equations import function_by_names, symbols_of
-from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs, symbolic_physics
+from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs, change_arrays, symbolic_physics
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.mean import MeanCorrector
@@ -26,6 +26,7 @@ from shipid.hybrid.simulated import SimulatedPhysics
 from shipid.observer import ESTIMATE_COLUMNS
 from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
+from shipid.users import error_location, is_user_code, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
 
 Array = np.ndarray
@@ -75,22 +76,18 @@ class ExportModel:
             )
         known = PredictorInputs(self.physics, self.layout)
         physics, method = symbolic_physics(self.predictor.physics), self.predictor.method
+        alone = known.paths(physics)
         try:
-            predicted: Any = symbolic_corrector(corrector).predict(physics, known.instants, known.paths(physics))
+            predicted: Any = symbolic_corrector(corrector).predict(physics, known.instants, alone)
             path = MX(predicted.reshape(physics.horizon, 2)).T
-        except (
-            ShipidError,
-            ArithmeticError,
-            LookupError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            RuntimeError,
-        ) as error:
+        except Exception as error:  # of a damaged file, of what CasADi's arrays lack of NumPy's, or in a user's code
             raise ShipidError(
-                f"the parts of the method {method!r} do not fit together ({error}): its file is damaged, or `predict` "
-                "takes what CasADi does not have of NumPy"
+                f"the parts of the method {method!r} do not fit together ({error})"
+                f"{error_location(error, type(corrector))}: its file is damaged, or `predict` takes what CasADi does "
+                "not have of NumPy"
             ) from error
+        if is_user_code(type(corrector)):
+            self._check_by_numbers(known, alone, path)
         inputs, outputs = (
             dict(known.inputs),
             {"path": path, "outside": ca.logic_or(self._outside(known), known.diverges)},
@@ -104,6 +101,29 @@ class ExportModel:
             inputs |= choice
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
         return function_by_names("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
+
+    def _check_by_numbers(self, known: PredictorInputs, alone: Any, path: MX) -> None:
+        """Raise ShipidError where `predict` gives another path on symbols than on numbers, at one drawn instant.
+
+        alone : (T, 1, 2) of the physics. path : (2, T) that the method made of it. On arrays of three axes some
+        functions of NumPy are silently others in CasADi, such as `np.max` and `np.ptp` along an axis.
+        """
+        random, home, drawn, arrays = np.random.default_rng(0), type(self.predictor.corrector), [], list[Any]()
+        for group, size in self.layout.sizes.items():
+            ends = [self.limits.get(name, (0.0, 1.0)) for name in getattr(self.layout, group)]
+            drawn.append(random.uniform(*np.resize(np.reshape(ends, (-1, 2)), (size, 2)).T))
+        change_arrays(known.instants, arrays.append)
+        symbols = [path.T, *(MX(one.reshape(-1)) for one in (*arrays, alone))]
+        made, *rest = map(np.array, ca.Function("values", [*known.inputs.values()], symbols).call(drawn))
+        numbers = (value.reshape(one.shape) for value, one in zip(rest, (*arrays, alone), strict=True))
+        given = change_arrays(known.instants, lambda _: next(numbers))
+        with locate_errors(f"{home.__name__}.predict", home):
+            expected = self.predictor.corrector.predict(self.predictor.physics, given, next(numbers))
+        if not np.allclose(made, expected.reshape(made.shape), rtol=1e-6, atol=1e-6, equal_nan=True):  # beyond rounding
+            raise ShipidError(
+                f"`predict` of the method {self.predictor.method!r} gives another path on symbols of CasADi than on "
+                "numbers: let it write to no array, and compute with arrays of one or two axes"
+            )
 
     def _outside(self, known: PredictorInputs) -> MX:
         """Whether the alarm is raised: the calibrated one, or else by the limits."""

@@ -37,7 +37,7 @@ def _as_symbols(value: Any) -> SX | None:
         return value
     try:
         return ca.SX(value)
-    except (NotImplementedError, TypeError, ValueError, RuntimeError):  # CasADi, for what it takes for no matrix
+    except RuntimeError:  # rows of unequal length; NotImplementedError, which is one: what CasADi takes for no matrix
         return None
 
 

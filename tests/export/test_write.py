@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -142,18 +144,41 @@ def test_a_method_of_ones_own_is_exported_unasked(simple, monkeypatch, tmp_path)
 
 
 @dataclass(frozen=True)
-class Sorted(StoredData):
+class Added(StoredData):
+    """A path of the physics to which a function of it is added."""
+
     hyperparameters: Mapping[str, float]
+    added: Callable[[Any], Any] = np.abs
     past: float = 0.0
 
     def predict(self, physics, instants, paths):  # noqa: ARG002
-        return paths + np.sort(instants.columns["u"])[:, None]
+        return paths + self.added(paths)
 
 
-def test_what_casadi_cannot_follow_is_refused_in_one_line(simple, tmp_path):
-    predictor = replace(simple, corrector=Sorted({}))
-    with pytest.raises(ShipidError, match="takes what CasADi does not have of NumPy"):
+@pytest.mark.parametrize("added", [np.sort, np.isnan, lambda paths: paths.copy(), lambda paths: paths if paths else 0])
+def test_what_casadi_cannot_follow_is_refused_in_one_line_with_its_place(added, simple, tmp_path):
+    predictor = replace(simple, corrector=Added({}, added))
+    with pytest.raises(ShipidError, match=rf"in {__file__}, line \d+: .* takes what CasADi does not have") as caught:
         predictor.export("c", tmp_path / "out")
+    assert "\n" not in str(caught.value)
+
+
+def written(paths):
+    paths[0] = 7.0
+    return paths
+
+
+@pytest.mark.parametrize("added", [written, *(partial(one, axis=0) for one in (np.ptp, np.max, np.min, np.std))])
+def test_what_is_another_function_in_casadi_is_refused(added, simple, tmp_path):
+    """It was exported, and wrong."""
+    predictor = replace(simple, corrector=Added({}, added))
+    with pytest.raises(ShipidError, match="gives another path on symbols of CasADi than on numbers: let"):
+        predictor.export("c", tmp_path / "out")
+
+
+def test_what_is_the_same_function_in_casadi_is_exported(simple, tmp_path):
+    predictor = replace(simple, corrector=Added({}, lambda paths: np.sin(paths).mean(axis=(0, 1))))
+    assert predictor.export("casadi", tmp_path / "own.casadi")
 
 
 @pytest.mark.parametrize(

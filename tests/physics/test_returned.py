@@ -35,6 +35,7 @@ def test_symbols_and_numbers_pass(value: Any) -> None:
         (ca.horzcat(v, v), r"a matrix of \(1, 2\)"),
         (None, "NoneType"),
         ([v, v], "list"),
+        ([[1.0, 2.0], [3.0]], "list"),
         (ca.MX.sym("v", 2), "MX"),
         ({}, "dict"),
     ],
