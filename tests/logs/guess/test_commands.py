@@ -251,7 +251,7 @@ def test_an_order_of_an_actuator_is_asked_though_its_effect_is_not_seen(name: st
     assert any(repr(name) in one.sentence and "n" in one.about for one in state.questions) == taken
 
 
-ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T < T.mean()
+ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T.mean() > T
 
 
 @pytest.mark.parametrize(
@@ -267,9 +267,9 @@ ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T < T.mean()
     ],
 )
 def test_a_shaft_that_hides_its_turns_astern_is_asked(name: str, shaft: np.ndarray, astern: float, asked: bool) -> None:
-    """It was drafted as if it drove the ship ahead in the share of the log in which this goes astern, without a word."""
+    """It was drafted as if it drove the ship ahead, in a log that goes astern for a share of it, without a word."""
     state = state_with_pose({name: shaft})
     state.r, back = R, round((1.0 - astern) * (len(T) - 1))
-    state.position = np.where(T <= T[back], state.position, 2 * state.position[back] - state.position)
+    state.position = np.where(T[back] >= T, state.position, 2 * state.position[back] - state.position)
     choose_commands(state)
     assert any("says its sense" in one.sentence for one in state.questions) == asked
