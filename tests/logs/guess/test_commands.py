@@ -261,6 +261,7 @@ ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T.mean() > T
         ("rpm", RPM, 0.0, False),
         ("rpm", ALWAYS, 0.5, True),
         ("rpm", ALWAYS, 0.1, True),
+        ("rpm", ALWAYS, 1.0, True),
         ("rpm", np.where(HALF, ALWAYS, -ALWAYS), 0.5, False),
         ("rpm", np.where(HALF, ALWAYS, 0.0), 0.5, False),
         ("bow thruster rpm", ALWAYS, 0.5, False),
@@ -269,7 +270,7 @@ ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T.mean() > T
 def test_a_shaft_that_hides_its_turns_astern_is_asked(name: str, shaft: np.ndarray, astern: float, asked: bool) -> None:
     """It was drafted as if it drove the ship ahead, in a log that goes astern for a share of it, without a word."""
     state = state_with_pose({name: shaft})
-    state.r, back = R, round((1.0 - astern) * (len(T) - 1))
+    state.r, state.astern, back = R, astern == 1.0, round((1.0 - astern) * (len(T) - 1))
     state.position = np.where(T[back] >= T, state.position, 2 * state.position[back] - state.position)
     choose_commands(state)
     assert any("says its sense" in one.sentence for one in state.questions) == asked
