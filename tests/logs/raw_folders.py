@@ -1012,7 +1012,8 @@ def add_decoys(random: np.random.Generator, writer: Writer, size: int, heading: 
         chosen = random.choice(words, int(random.integers(0, min(6, len(words)))), replace=False)
         kinds = [next(kind for kind, form in enumerate(DECOYS) if re.search(form, word, re.I)) for word in chosen]
         pick["decoys"] = [(str(w), 3 if random.random() < 0.1 else kind) for w, kind in zip(chosen, kinds, strict=True)]
-        pick["filtered"] = "psi" in writer.names and pick["heading"] == "deg360" and random.random() < 0.12
+        filtered = "psi" in writer.names and pick["heading"] == "deg360" and random.random() < 0.12
+        pick["filtered"] = writer.names["psi"] + "_filt" if filtered else ""  # of every file: one may exchange names
         writer.names |= {word: word for word, _ in pick["decoys"]}
         writer.units |= {word: "" for word, _ in pick["decoys"]}
     for word, kind in pick["decoys"]:
@@ -1021,10 +1022,8 @@ def add_decoys(random: np.random.Generator, writer: Writer, size: int, heading: 
         values = [60 + 3 * walk, 24.3 + 0.1 * walk, np.arange(size, dtype=float), np.full(size, 3.0), wave]
         writer.add(word, cells(values[kind], 0 if kind in (2, 3) else 2))
     if pick["filtered"]:
-        name = writer.names["psi"] + "_filt"
-        writer.units[name] = ""
         smooth = pd.Series(heading).ewm(alpha=0.5).mean().to_numpy()
-        writer.add(name, cells(np.mod(smooth / DEGREE, 360), 2))
+        writer.add(pick["filtered"], cells(np.mod(smooth / DEGREE, 360), 2))
 
 
 def write_clock(writer: Writer, pick: dict[str, Any], t: Array, begin: datetime, dt: float) -> tuple[float, ...]:

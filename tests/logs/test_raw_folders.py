@@ -71,6 +71,13 @@ def test_the_true_mapping_gives_the_motion_back_and_wrong_ones_do_not(seed: int,
         assert name in import_with(folder, folder.mapping | {"columns": columns | {name: wrong}}, tmp_path)
 
 
+def test_every_file_of_a_folder_has_the_same_columns(tmp_path: Path) -> None:
+    """The filtered heading had another name in the file in which heading and course are exchanged."""
+    heads = {one.file.read_text().splitlines()[0] for one in draw_raw_folder(770534006, tmp_path).recordings}
+    assert len(heads) == 1
+    assert "_filt" in heads.pop()
+
+
 DRIVES = ["single", "twin", "twinrudder", "azimuth", "outboard"]
 
 

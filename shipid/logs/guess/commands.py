@@ -250,7 +250,7 @@ def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict
         if not tunnel and not azimuth and _runs_astern(state, name):
             extra = {**extra, "sign": -1}
             why += "; negative while the ship goes ahead"
-        if not tunnel and not state.astern and _hides_astern(state, name):
+        if not tunnel and _hides_astern(state, name):
             words = f"{name!r} is never negative, but turns while the ship goes astern: which column says its sense"
             state.ask(("n",), f"{words}? Without one its turns astern are taken as ahead")
     state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)

@@ -23,7 +23,7 @@ FAULTS = {
     "still": (
         "frozen sensor",
         UNSURE,
-        "repeats one value {} while the ship turns to both sides, and is noisy in other turns. Was it held so?",
+        "repeats one value {} while the ship turns to both sides, and is noisy in other turns. Was it ordered so?",
     ),
 }
 """Kind of a fault -> the kind of its finding, how sure it is, and what is seen."""
@@ -50,7 +50,7 @@ def report_command_faults(state: State, sniffed: LogTable) -> None:
             sentence = f"{one.source!r} {words.format(_fault_places(state, some, t))}"
             if state.joined or sure == UNSURE:
                 remedy = "leave these cells empty, and draft again" if state.joined else "switch the repair on"
-                state.ask((one.name,), f"{sentence} If not, {remedy}")
+                state.ask((one.name,), f"{sentence} Unless it was ordered, {remedy}")
             state.find(title, (one.source,), sure, sentence, None if state.joined else _break_repair(state, some, t))
 
 

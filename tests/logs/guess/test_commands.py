@@ -251,14 +251,26 @@ def test_an_order_of_an_actuator_is_asked_though_its_effect_is_not_seen(name: st
     assert any(repr(name) in one.sentence and "n" in one.about for one in state.questions) == taken
 
 
+ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T.mean() > T
+
+
 @pytest.mark.parametrize(
-    ("shaft", "asked"), [(np.abs(RPM), False), (RPM, False), (np.where(T % 40 < 20, 90.0, 60.0), True)]
+    ("name", "shaft", "astern", "asked"),
+    [
+        ("rpm", np.abs(RPM), 0.0, False),
+        ("rpm", RPM, 0.0, False),
+        ("rpm", ALWAYS, 0.5, True),
+        ("rpm", ALWAYS, 0.1, True),
+        ("rpm", ALWAYS, 1.0, True),
+        ("rpm", np.where(HALF, ALWAYS, -ALWAYS), 0.5, False),
+        ("rpm", np.where(HALF, ALWAYS, 0.0), 0.5, False),
+        ("bow thruster rpm", ALWAYS, 0.5, False),
+    ],
 )
-def test_a_shaft_that_hides_its_turns_astern_is_asked(shaft: np.ndarray, asked: bool) -> None:
-    """The ship goes astern in the last case: its shaft was drafted as if it drove the ship ahead, without a word."""
-    state = state_with_pose({"rpm": shaft})
-    state.r = R
-    if asked:
-        state.position = np.where(T.mean() > T, state.position, 2 * state.position[len(T) // 2] - state.position)
+def test_a_shaft_that_hides_its_turns_astern_is_asked(name: str, shaft: np.ndarray, astern: float, asked: bool) -> None:
+    """It was drafted as if it drove the ship ahead, in a log that goes astern for a share of it, without a word."""
+    state = state_with_pose({name: shaft})
+    state.r, state.astern, back = R, astern == 1.0, round((1.0 - astern) * (len(T) - 1))
+    state.position = np.where(T[back] >= T, state.position, 2 * state.position[back] - state.position)
     choose_commands(state)
     assert any("says its sense" in one.sentence for one in state.questions) == asked

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipid.logs.guess.columns import guess
 from shipid.logs.importing import read_mapping
 from tests.logs.simulated import globe, guess_of, import_draft, si_log
 
@@ -40,12 +41,24 @@ def test_what_may_be_an_order_is_asked_and_stays_as_it_is(tmp_path: Path) -> Non
     proposal = guess_of(tmp_path, frame)
     (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
     assert found.columns == ("rpm",)
-    asked = [
-        one.sentence for one in proposal.questions if "Was that ordered? If not, switch the repair on" in one.sentence
-    ]
+    words = "Was that ordered? Unless it was ordered, switch the repair on"
+    asked = [one.sentence for one in proposal.questions if words in one.sentence]
     assert len(asked) == 1
     assert "'rpm' is 0 in 9 rows at 3 places" in asked[0]
     dataset = import_draft(tmp_path, proposal)
     mapping = read_mapping(tmp_path / "draft.toml")
     assert not any(repair.enabled for repair in mapping.repair if repair.kind in ("break", "despike"))
     assert len(dataset.frame) == len(frame)
+
+
+def test_lapses_in_files_of_a_folder_are_asked(tmp_path: Path) -> None:
+    """A repair would have times of one file."""
+    frame = globe(0)
+    frame.loc[300:303, "rpm"] = 0.0
+    for number, rows in enumerate(np.array_split(np.arange(len(frame)), 2)):
+        frame.iloc[rows].to_csv(tmp_path / f"run{number}.csv", index=False)
+    proposal = guess(tmp_path)
+    (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
+    (asked,) = (one for one in proposal.questions if "'rpm' is 0" in one.sentence)
+    assert found.repair is None
+    assert asked.sentence.endswith("Unless it was ordered, leave these cells empty, and draft again")

@@ -77,6 +77,8 @@ def test_a_thrust_is_the_order_that_the_vessel_takes(command: str, asked: bool) 
     state = state_with_pose({"thrust [N]": FORCE})
     state.commands = (command,)
     suggest_outputs(state, reserve_outputs(state))
-    assert [(one.name, one.source) for one in state.suggestions] == [(command, "thrust [N]")]
+    (drafted,) = state.suggestions
+    unit, extra = ("rpm", {"factor": 1.0}) if asked else ("N", {})  # an empty factor is asked for
+    assert (drafted.name, drafted.source, drafted.unit, drafted.extra) == (command, "thrust [N]", unit, extra)
     (question,) = state.questions
     assert ("curve of pairs (N, rpm)" in question.sentence) == asked

@@ -12,6 +12,7 @@ from shipid.errors import DataError
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.motion import choose_motion
 from shipid.logs.guess.search import Frame
+from shipid.logs.mapping import to_si
 from tests.logs.simulated import si_log, state_of
 
 LOG = si_log()
@@ -32,9 +33,12 @@ def sources(state: State) -> dict[str, str]:
 
 
 def assert_motion(state: State) -> None:
-    """The position and the heading of the state are those of the ship."""
+    """The position and the heading of the state are those of the ship, and the drafted heading is read so."""
     assert state.psi is not None
     assert state.position is not None
+    (psi,) = (one for one in state.suggestions if one.name == "psi")
+    angle = psi.extra.get("sign", 1) * state.columns[psi.source] + psi.extra.get("offset", 0.0)
+    np.testing.assert_allclose(np.exp(1j * to_si(psi.unit, "psi") * angle), np.exp(1j * PSI), atol=1e-6)
     np.testing.assert_allclose(np.exp(1j * state.psi), np.exp(1j * PSI), atol=1e-6)
     np.testing.assert_allclose(state.position - state.position[0], NORTH + 1j * EAST - NORTH[0] - 1j * EAST[0])
 

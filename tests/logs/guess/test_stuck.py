@@ -36,6 +36,9 @@ def test_a_sensor_that_stands_still_in_a_turn_is_broken_out(name: str, tmp_path:
     (found,) = [finding for finding in proposal.findings if finding.kind == "frozen sensor"]
     assert found.columns == (name,)
     assert found.repair is not None
+    turned, told = LOG.loc[LOG["t"].between(TURNING, TURNING + 30.0), ["t", "psi", "r"]], found.sentence
+    turn = turned["psi"].iloc[-1] - turned["psi"].iloc[0] - 30.0 * turned["r"].iloc[0] * (name == "r")
+    assert float(told[told.rindex("(") + 1 :].removesuffix(" deg)")) == pytest.approx(np.degrees(turn), abs=2.0)
     (interval,) = found.repair["intervals"]
     assert interval == pytest.approx([TURNING, TURNING + 31.0], abs=0.1)
     whole = import_draft(tmp_path, proposal).frame
