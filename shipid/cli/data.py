@@ -187,7 +187,7 @@ def data_check(
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position."""
+    """Check a dataset: its clock, ranges and frozen rows, and whether its signals are one motion."""
     from shipid.data.held import warn_of_constant_commands
     from shipid.identification.diagnosis import NONE, diagnose
 
