@@ -140,7 +140,7 @@ def foundations_of(
     for index, family in enumerate(families):
         if family.name.lower() == NO_MODEL:
             raise DocumentError(
-                f"{family.name!r} is the foundation without physics: rename the family", path=f"family.{index}.name"
+                f"{family.name!r} is taken by the foundation without physics: rename the family", path=f"family.{index}.name"
             )
         bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
         vessel = bases[0] if isinstance(bases[0], Vessel) else None
