@@ -80,7 +80,7 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
     several = isinstance(folders, Sequence) and not isinstance(folders, str)
     places = [as_path("folder", folder) for folder in folders] if several else []
     if len(places) < 2 or len({place.resolve() for place in places}) < len(places):
-        raise ShipidError("name two folders or more, each once")
+        raise ShipidError("name two folders or more, each once", path="folders")
     return compare_results([read_results(place) for place in places], pairs)
 
 

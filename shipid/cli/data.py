@@ -78,7 +78,7 @@ def data_import(
     if names or vessel or frame:
         raise ShipidError("is for drafts: give it with --guess LOG", path="--names, --vessel or --frame")
     if not mapping:
-        raise ShipidError("name a mapping, or draft one with --guess LOG")
+        raise ShipidError("missing: name a mapping, or draft one with --guess LOG", path="MAPPING")
     from shipid.logs.catalogue import fetch_log
 
     declared = shipid.read_mapping(mapping)
@@ -153,7 +153,7 @@ def data_segment(
 
     declared = shipid.read_mapping(mapping)
     if declared.parts is not None:
-        raise ShipidError("says where runs begin ([parts]): nothing is to be cut", file=mapping)
+        raise ShipidError("its [parts] say where runs begin: import it as it is", file=mapping)
     file = check_output(out or Path(f"{Path(mapping).stem}-segments.toml"), endings=(".toml",))
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch_log(mapping))
@@ -187,7 +187,7 @@ def data_check(
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position."""
+    """Check a dataset: its clock, ranges and frozen rows, and whether its signals are one motion."""
     from shipid.data.held import warn_of_constant_commands
     from shipid.identification.diagnosis import NONE, diagnose
 

@@ -125,7 +125,9 @@ def identify_command(
     how |= {} if folds is None else {"folds": folds}
     needless = [name for name, value in {"--profile": profile, "--design": design}.items() if value and structures]
     if needless:
-        raise ShipidError("does not go with --structures: identify the structure chosen", path=needless[0])
+        raise ShipidError(
+            "does not go with --structures: give it when you identify the structure chosen", path=needless[0]
+        )
     with open_answer(as_json) as answer, _errors_of_settings(settings):
         if structures is not None:
             check_comparison(log, declared, names, **how)

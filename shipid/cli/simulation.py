@@ -31,7 +31,7 @@ def simulate_command(
     ] = None,
     manoeuvres: Annotated[
         str | None,
-        typer.Option(help="runs of a vessel: bundled study or TOML file with a [truth], or with [[manoeuvre]] blocks"),
+        typer.Option(help="runs of a vessel: TOML file with [[manoeuvre]] blocks"),
     ] = None,
     changes: Changes = None,
     trust: Trust = False,
@@ -41,7 +41,7 @@ def simulate_command(
     if manoeuvres is None:
         _simulate_truth(name, out, changes, trust, as_json)
     elif changes:
-        raise ShipidError("changes a study: write the document of manoeuvres as it is meant", path="--set")
+        raise ShipidError(f"changes a study alone: write the change into {manoeuvres}", path="--set")
     else:
         _simulate_vessel(name, manoeuvres, out or Path(f"{document_stem(name)}-simulated.csv"), as_json)
 
@@ -169,7 +169,7 @@ def replay_command(
 
     file = check_output(out or Path(f"{document_stem(vessel)}-replay.html"), endings=(".html",))
     if not step > 0:
-        raise ShipidError(f"{step:g} s must be positive", path="--step")
+        raise ShipidError(f"{step:g} s: must be above 0", path="--step")
     ship, log = shipid.load_vessel(vessel), shipid.read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
     short = too_short(log, chosen, step, ahead)

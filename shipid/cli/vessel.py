@@ -124,7 +124,7 @@ def vessel_new(
         raise ShipidError(f"missing: a {kind} needs it", path=f"--{lacking}")
     other = of_ships if of_usv else of_usvs
     if foreign := next((option for option, value in other.items() if value is not None), None):
-        raise ShipidError(f"is of a {'ship' if of_usv else 'usv'}: leave it out", path=f"--{foreign}")
+        raise ShipidError(f"is for a {'ship' if of_usv else 'usv'}: leave it out", path=f"--{foreign}")
     if mass is not None and speed is not None:
         places = tuple(_parse_place(text) for text in thruster or ())
         guessed = guess_craft(SmallCraft(length, beam, mass, speed, places, thrust, swivel, hulls), called, str(out))

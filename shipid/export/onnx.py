@@ -98,7 +98,8 @@ def _networks_to_write(model: ExportModel) -> tuple[list[tuple[Normaliser, Layer
     if not isinstance(corrector, Compensator):
         raise ShipidError(
             f"the method {model.predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "
-            "path-refined, path-trained, calibrator and one-step; export this one to c, fmu or casadi"
+            "path-refined, path-trained, calibrator and one-step; export this one to c, fmu or casadi",
+            path="--to",
         )
     networks = []
     for network in corrector.networks:

@@ -92,7 +92,7 @@ def _check_target(to: str, out: str | os.PathLike[str], name: str | None) -> tup
         check_class("name", name, str, "such as 'gunnerus'", DocumentError)
     target, file = EXPORT_TARGETS.get(str(to)), as_path("out", out)
     if target is None:
-        raise DocumentError(f"no such target: {suggest_name(str(to), EXPORT_TARGETS)}", path="--to")
+        raise DocumentError(f"{str(to)!r} is no target: {suggest_name(str(to), EXPORT_TARGETS)}", path="--to")
     if not target.ending and file.exists() and not file.is_dir():
         raise DocumentError(f"is a file: the target {to} takes a folder", file=file, path="--out")
     if target.ending and (file.is_dir() or file.suffix != target.ending):

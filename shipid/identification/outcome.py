@@ -201,7 +201,7 @@ def pick_runs(
             selected.update(names)
         return [run for run in dataset.runs if run in selected]
 
-    tested = chosen(held_out, "held out")
+    tested = chosen(held_out, "--test")
     fitted = [run for run in (chosen(runs, "runs") or dataset.runs) if run not in tested]
     if not fitted:
         raise DataError("every run is held out: leave at least one run for the fit", path="runs")

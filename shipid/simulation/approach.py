@@ -74,15 +74,13 @@ class Controls:
     def helm(self) -> Mapping[str, float]:
         """Angle command -> sign that turns the ship to starboard."""
         if self.drives and not self._turning:
-            what = ": a manoeuvre needs that of a rudder or an azimuth unit"
+            message = f"no angle turns {self.vessel.name}: a manoeuvre needs a rudder or an azimuth unit that does"
             if self.differential:
-                what = (
-                    ", it steers by the difference of its drives: the kinds `turning` and `steps` of a "
-                    f"[[truth.manoeuvre]] order each one ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
+                message = (
+                    "no rudder: the vessel steers by the difference of its drives; the kinds `turning` and `steps` of "
+                    f"a [[truth.manoeuvre]] order each ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
                 )
-            raise DocumentError(
-                f"no angle command turns {self.vessel.name}{what}", file=self.vessel.file, path="thruster"
-            )
+            raise DocumentError(message, file=self.vessel.file, path="thruster")
         return self._turning
 
     @property

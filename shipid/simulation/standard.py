@@ -118,10 +118,10 @@ def define_standard(
 def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
     """Refuse angles [deg] that a kind does not take, or that are none."""
     if len(angles) > most:
-        raise ShipidError(f"{name} takes {most or 'no'} {plural_word(most, 'angle')}", path="ANGLES")
+        raise ShipidError(f"{name} takes {most or 'no'} {plural_word(most, 'angle')}, not {len(angles)}", path="ANGLES")
     for angle, greatest in zip(angles, (MOST_HELM, MOST_HEADING), strict=False):
         if not 0 < angle <= greatest:
-            remedy = f"angles are above 0 and at most {greatest:g} deg: no sign gives the side of the first turn"
+            remedy = f"angles are above 0 and at most {greatest:g} deg: --side gives the side of the first turn"
             raise ShipidError(f"{angle:g} deg: {remedy}", path="ANGLES")
 
 

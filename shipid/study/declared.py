@@ -110,7 +110,10 @@ def bases_of(
     kind, value = next((kind, value) for kind in SIMULATORS if (value := getattr(family, kind)) is not None)
     found = named_simulators(kind, value, file, f"{path}.{kind}", simulators, trust)
     if family.structure or (family.perturb and kind == "predictions"):
-        raise DocumentError(f"{kind} has no structure, and a table no numbers: leave it out", path=f"{path}.{kind}")
+        raise DocumentError(
+            f"goes with a vessel{'' if family.structure else ' or a function'}, not with {kind}: leave it out",
+            path=f"{path}.{'structure' if family.structure else 'perturb'}",
+        )
     return [*found]
 
 
@@ -136,7 +139,9 @@ def foundations_of(
     foundations: list[Foundation] = []
     for index, family in enumerate(families):
         if family.name.lower() == NO_MODEL:
-            raise DocumentError("this name is taken by the foundation without physics", path=f"family.{index}.name")
+            raise DocumentError(
+                f"{family.name!r} is taken by the foundation without physics: rename the family", path=f"family.{index}.name"
+            )
         bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
         vessel = bases[0] if isinstance(bases[0], Vessel) else None
         parent = families[_root(study.family, index)]

@@ -505,7 +505,7 @@ def _check_amounts_of_truth(study: Study, truth: Truth) -> None:
     """Refuse a truth with too few manoeuvres for the grid, or too short ones for the horizon."""
     test, most, ahead = study.split.test, max(study.grid.N_D), study.prediction.horizon * study.prediction.step
     if not isinstance(test, int):
-        raise DocumentError("runs of a [truth] are drawn: give the number of test runs", path="split.test")
+        raise DocumentError("runs of a [truth] are drawn: give the number of test runs, such as 20", path="split.test")
     pool = truth.manoeuvres - test
     if pool < max(most, 2):
         message = f"{most}: {truth.manoeuvres} manoeuvres less {test} test runs leave {pool}, and 2 are the fewest"

@@ -56,7 +56,7 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
             fault = f"{odd[0]} is not of the study: give one of {', '.join(map(str, offered))}, or -1 for any"
             raise DataError(fault, file=file, path=name)
     if groups["model"].isna().any() or not len(groups):
-        raise DataError("a name is missing, or every row: give each step of each window", file=file, path="model")
+        raise DataError("a row has no name, or there is no row: give each step of each window", file=file, path="model")
     for (model, N_D, seed), part in groups.groupby(["model", "N_D", "seed"], sort=False):
         places = ordered_places(part, results.test, file)
         plan, doubt = results.plan, doubt_of_places(places, results.test, believable_errors(results))

@@ -197,7 +197,10 @@ def stored_plan(folder: Path, trust: bool = False) -> Plan:
     Raises ShipidError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
     """
     if not (folder / STUDY).is_file():
-        raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
+        raise ResultError(
+            f"is not the folder of a run: {'it holds no study.toml' if folder.is_dir() else 'there is no such folder'}",
+            file=folder,
+        )
     record, document = provenance(folder), documents.read_document(folder / STUDY)
     stored, file = read_json(folder / VESSELS), folder / VESSELS
     headers = read_json(folder / SIMULATORS_FILE) if (folder / SIMULATORS_FILE).is_file() else {}

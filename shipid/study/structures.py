@@ -175,7 +175,8 @@ def compare_structures(
     table = _structure_table(names, every, {name: len(fit.solution.paths) for name, fit in fits.items()}, notes, fitted)
     if not np.isfinite(table["position"].iloc[0]):
         raise ShipidError(
-            "no structure predicts every run that was held out: give priors, more runs, or a shorter --ahead"
+            "no structure predicts every run that was held out: give priors, more runs, or a shorter --ahead",
+            path="--structures",
         )
     chosen = str(table["structure"].iloc[0])
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]

@@ -163,7 +163,10 @@ def windows(
         else store.stored_plan(folder, trust)
     )
     if plan.parts:
-        raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
+        raise ShipidError(
+            f"has several parts: give the folder parts/{next(iter(plan.parts))} of its run, or of another",
+            file=plan.file,
+        )
     if every:  # without the tables that are to be made
         plan = replace(
             plan, foundations=tuple(one for one in plan.foundations if not isinstance(one.base, PredictionTable))

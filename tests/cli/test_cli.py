@@ -86,7 +86,7 @@ MISTAKES = {
     "broken study": (["study", "run", BAD / "studies" / "no-question.toml"], "no-question.toml: question: missing"),
     "no --set path": (["study", "run", "quick", "--set", "grid.N_D"], "write --set path=value"),
     "bad --set value": (["study", "run", "quick", "--set", "grid.N_D=[1000]"], "less 20 test runs leave 100"),
-    "no folder": (["study", "resume", "nowhere"], "nowhere: is not the folder of a run"),
+    "no folder": (["study", "resume", "nowhere"], "nowhere: is not the folder of a run: there is no such folder"),
     "foreign folder": (["study", "report", BAD], "holds no study.toml"),
     "broken mapping": (["data", "import", BAD / "mappings" / "unknown_unit.toml", "x.csv"], "valid here: rad/s"),
     "no dataset": (["data", "check", "gone.parquet"], "gone.parquet: cannot be read"),

@@ -61,13 +61,13 @@ def test_a_new_craft_from_its_thrusters(tmp_path: Path) -> None:
         (("--speed", 3, "--thruster", "-0.8,0.4"), "--mass: missing: a usv needs it"),
         (("--mass", 80, "--speed", 3), "--thruster: missing: a usv needs it"),
         (("--mass", 80, "--speed", 3, "--thruster", "aft"), "'aft': write the place as X,Y in m"),
-        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--rpm", 90), "--rpm: is of a ship: leave it out"),
-        (("--kind", "ship", "--mass", 80, "--draught", 1, "--block", 0.5), "--mass: is of a usv: leave it out"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--rpm", 90), "--rpm: is for a ship: leave it out"),
+        (("--kind", "ship", "--mass", 80, "--draught", 1, "--block", 0.5), "--mass: is for a usv: leave it out"),
         (("--kind", "ship", "--block", 0.5), "--draught: missing: a ship needs it"),
         (("--kind", "boat"), "boat"),
-        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--ship-type", "tanker"), "--ship-type: is of a ship"),
-        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--propulsor", "azimuth"), "--propulsor: is of a ship"),
-        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--tunnel-thruster"), "--tunnel-thruster: is of a ship"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--ship-type", "tanker"), "--ship-type: is for a ship"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--propulsor", "azimuth"), "--propulsor: is for a ship"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--tunnel-thruster"), "--tunnel-thruster: is for a ship"),
     ],
 )
 def test_options_of_another_kind_of_vessel_are_one_line(options: tuple[Any, ...], message: str, tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ def test_on_a_full_disk_the_export_that_was_there_stays(simple, tmp_path, monkey
 @pytest.mark.parametrize(
     ("to", "out", "options", "message"),
     [
-        ("matlab", "a", {}, "--to: no such target: valid: c, casadi, fmu, onnx"),
+        ("matlab", "a", {}, "--to: 'matlab' is no target: valid: c, casadi, fmu, onnx"),
         ("fmu", "a.zip", {}, "ends in .fmu"),
         ("casadi", "log.csv", {}, "ends in .casadi"),
         ("onnx", "ship.toml", {}, "ends in .onnx"),

@@ -144,8 +144,14 @@ def test_a_method_that_asks_for_more_is_refused(
     ("families", "words"),
     [
         (TABLE + 'base = "gunnerus-28.9"\n', "stands beside 'base': give one of base, predictions, function"),
-        (TABLE + '[[family.perturb]]\nparameters = ["m"]\nfactor = 2.0\n', "a table no numbers: leave it out"),
-        (FAMILY.format("my_ship:simulate") + 'structure = {"wind.off" = true}\n', "function has no structure"),
+        (
+            TABLE + '[[family.perturb]]\nparameters = ["m"]\nfactor = 2.0\n',
+            "perturb: goes with a vessel or a function, not with predictions: leave it out",
+        ),
+        (
+            FAMILY.format("my_ship:simulate") + 'structure = {"wind.off" = true}\n',
+            "structure: goes with a vessel, not with function: leave it out",
+        ),
         ('[[family]]\nname = "none-at-all"\n', "missing: name a base vessel, or a family to extend"),
     ],
 )

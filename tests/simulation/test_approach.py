@@ -49,7 +49,7 @@ def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:
     assert caught.value.path == "thruster"
     amidships = {"thruster.port.x": 0.0, "thruster.port.y": 0.0, "thruster.starboard.off": True}
     balanced = SHIP.with_values(amidships | {"added_mass.Y_rdot": 0.0, "added_mass.N_vdot": 0.0})
-    with pytest.raises(DocumentError, match="no angle command turns R/V Gunnerus"):
+    with pytest.raises(DocumentError, match="no angle turns R/V Gunnerus"):
         _ = Controls(balanced).helm
 
 
@@ -59,7 +59,7 @@ def test_two_screws_steer_by_their_difference() -> None:
     assert otter.differential
     with pytest.raises(
         DocumentError,
-        match=r"no angle command turns .* steers by the difference of its drives: .* each one .port.n_rpm",
+        match=r"no rudder: .* difference of its drives; .* order each .port.n_rpm",
     ):
         _ = otter.helm
     assert otter.ahead(2.0) == {"port.n": 2.0, "starboard.n": 2.0}

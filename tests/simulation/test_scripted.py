@@ -50,7 +50,7 @@ def test_given_manoeuvres_are_performed_as_in_python(tmp_path: Path) -> None:
 
 
 def test_a_vessel_that_cannot_perform_a_manoeuvre_is_not_a_key_of_the_document(tmp_path: Path) -> None:
-    with pytest.raises(DocumentError, match="no angle command turns") as caught:
+    with pytest.raises(DocumentError, match="no rudder") as caught:
         simulate_script(load_vessel("otter"), written(tmp_path, GIVEN))
     assert caught.value.path == "manoeuvre.0"
 

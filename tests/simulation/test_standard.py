@@ -65,7 +65,7 @@ def test_all_is_measured_and_sides_mirror(name: str, angles: tuple[float, ...]) 
     [
         ("zigzak", (), {}, "manoeuvre 'zigzak' is not known: did you mean 'zigzag'?"),
         ("zigzag", (1, 2, 3), {}, "ANGLES: zigzag takes 2 angles"),
-        ("stop", (1,), {}, "ANGLES: stop takes no angles"),
+        ("stop", (1,), {}, "ANGLES: stop takes no angles, not 1"),
         ("turning", (-35,), {}, "ANGLES: -35 deg: angles are above 0 and at most 90 deg"),
         ("turning", (), {"side": "left"}, "side 'left' is not known"),
         ("turning", (), {"speed": 0.0}, "--speed: 0 m/s"),

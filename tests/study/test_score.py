@@ -114,8 +114,8 @@ def test_each_fault_is_named(tmp_path: Path, results: Results, fault: str) -> No
         (lambda t: t.assign(N_D=999), "N_D: 999 is not of the study: give one of 4, or -1 for any"),
         (lambda t: t.assign(N_D="all"), "N_D: all is not of the study"),
         (lambda t: t.assign(seed=np.nan), "seed: nan is not of the study"),
-        (lambda t: t.assign(model=None), "model: a name is missing"),
-        (lambda t: t[:0], "model: a name is missing, or every row"),
+        (lambda t: t.assign(model=None), "model: a row has no name"),
+        (lambda t: t[:0], "model: a row has no name, or there is no row"),
     ],
 )
 def test_faults_of_rows_are_one_line(tmp_path: Path, results: Results, change: Any, words: str) -> None:
