@@ -249,12 +249,7 @@ def _number_type(parameter: Parameter) -> Any:
 
 
 def _table_type(grammar: Grammar) -> Any:
-    named = Field(json_schema_extra={"propertyNames": {"pattern": _whole_pattern(grammar.names)}})
-    return Annotated[dict[str, FiniteFloat], AfterValidator(grammar.check), named]
-
-
-def _whole_pattern(names: str) -> str:
-    return f"^(?:{names})$"
+    return Annotated[dict[str, FiniteFloat], AfterValidator(grammar.check)]
 
 
 def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[VesselBlock]:
@@ -264,9 +259,7 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
     config: dict[str, Any] = {}
     for parameter in declared:
         if parameter.kind == "open" and isinstance(parameter.unit, Grammar):
-            patterns = {_whole_pattern(parameter.unit.names): {"type": "number"}}
-            editors = {"patternProperties": patterns, "additionalProperties": False}
-            config = {"extra": "allow", "json_schema_extra": editors}
+            config = {"extra": "allow", "json_schema_extra": {"additionalProperties": False}}  # on a page of keys
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(parameter.unit))
             continue
