@@ -43,7 +43,6 @@ class InputLayout:
     planned: tuple[str, ...]
     horizon: int
     estimates: tuple[str, ...]
-    commands: tuple[str, ...]
     physics: tuple[str, ...] = ()
 
     @property
