@@ -353,14 +353,9 @@ def _keys_of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
 
-def vessel_model(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
-    """Pydantic model of a whole vessel document, with the terms of installed packages that it names.
-
-    Without a document it has those of all packages: its JSON schema serves editors.
-    """
-    if document is None:
-        TERMS.load_all()
-    for _, key, _ in () if document is None else (*term_blocks(document), *term_blocks(document, off=True)):
+def vessel_model(document: Mapping[str, Any]) -> type[BaseModel]:
+    """Pydantic model of a whole vessel document, with the terms of installed packages that it names."""
+    for _, key, _ in (*term_blocks(document), *term_blocks(document, off=True)):
         TERMS.get(key)
     return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(rows_of_role("command")))
 
