@@ -148,7 +148,7 @@ def vessel_page() -> str:
     """Every key of a vessel document: its blocks, then a block for each term."""
     seen: Seen = set()
     lines = title("Keys of the vessel document", "reference-vessel-document")
-    lines += blocks("", without(schema_of(vessel_model()), {*FIXED, "wind", "thruster"}), seen)
+    lines += blocks("", without(schema_of(vessel_model({})), {*FIXED, "wind", "thruster"}), seen)
     for key, term in TERMS.items():
         group, kind = key.split(".")
         path, shown_kind = (key, None) if group in FIXED else ("thruster.NAME" if group == "thruster" else group, kind)

@@ -562,11 +562,6 @@ class ObservedStart:
     drift: Array
 
 
-def moves_start(settings: Observer, path: PathSource) -> bool:
-    """Whether a path starts at the filtered position; else where the ship is, as the true path does."""
-    return path == "position" and {"north", "east"} <= set(settings.measured)
-
-
 def observed_start(
     filters: FilterBank,
     columns: Mapping[str, Array],
@@ -584,7 +579,7 @@ def observed_start(
     model, zero = filters.model, np.zeros(len(columns["u"]))
     begun: dict[str, Array] = {**columns}
     begun |= {name: columns[f"observer.{name}"] for name in MEASURED_MOTION}
-    if not moves_start(filters.settings, path):
+    if path != "position" or not {"north", "east"} <= set(filters.settings.measured):  # where the ship is
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
     begun["u"] = begun["u"] - north * np.cos(psi) - east * np.sin(psi)

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.windows import constant_motion
-from shipid.files import read_json
 from shipid.hybrid.bands import Region
 from shipid.metrics import (
     PREDICTION_ERRORS,
@@ -26,7 +25,6 @@ from shipid.report.content import TRIAL_COLUMNS, PathKey, model_text
 from shipid.report.selection import FEW_RUNS, figure_sizes, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
-from shipid.study.envelope import envelope_table
 from shipid.study.plan import grid_seeds, learns_from_runs, vessels_of
 from shipid.study.results import Results
 from shipid.vessel.outline import ship_outline
@@ -221,11 +219,6 @@ def tracks_frame(results: Results) -> pd.DataFrame:
     """Path of every run [m] and its part in the study."""
     frame = results.dataset.frame[["run", "north", "east"]]
     return frame.assign(set=np.where(frame["run"].isin(list(results.test.spans)), "test", "training and validation"))
-
-
-def envelope_frame(results: Results) -> pd.DataFrame:
-    """Least, mean and greatest input per set, as the paper's Tables 1 and 2; degrees and rpm."""
-    return envelope_table(read_json(results.folder / store.ENVELOPE), results.plan.study.published)
 
 
 def factors_frame(results: Results) -> pd.DataFrame:

@@ -14,12 +14,13 @@ from shipid.answer import bands, frames, methods, sentences
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
 from shipid.errors import ResultError
-from shipid.files import write_table, write_text
+from shipid.files import read_json, write_table, write_text
 from shipid.metrics import summarise_errors
 from shipid.report import AnswerSentence, ReportContent, summary_text, write_report
 from shipid.report.methods import MethodsContent, sentences_on_methods, write_comparison
 from shipid.study import store
 from shipid.study.declared import NO_MODEL
+from shipid.study.envelope import envelope_table
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, model_label, plan_text, run_command, verdict_method
 from shipid.study.results import Results, read_results
@@ -63,7 +64,7 @@ def report_content(results: Results) -> ReportContent:
         commands=frames.commands_frame(results),
         snapshots=frames.window_snapshots(results),
         tracks=frames.tracks_frame(results),
-        envelope=frames.envelope_frame(results),
+        envelope=envelope_table(read_json(results.folder / store.ENVELOPE), plan.study.published),
         repairs=pd.DataFrame(results.dataset.metadata.get("repairs", []), columns=REPAIR_COLUMNS),
         provenance=frames.provenance_words(results),
         study_document=plan_text(plan),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shipid.cli.terminal import four_digits, print_table
+from shipid.files import json_text, write_table
 from shipid.units import plural_word
 
 if TYPE_CHECKING:
@@ -77,8 +78,6 @@ class Answer:
     def save(self, what: str, file: Path | None, rows: DataFrame) -> None:
         """Write a table, if a file is given, and say so."""
         if file is not None:
-            from shipid.files import write_table
-
             write_table(file, rows)
             self.say(f"{what} -> {file}", file=file)
 
@@ -94,6 +93,4 @@ def open_answer(as_json: bool) -> Iterator[Answer]:
     answer = Answer(as_json)
     yield answer
     if as_json:
-        from shipid.files import json_text
-
         sys.stdout.write(json_text(answer.contents) + "\n")

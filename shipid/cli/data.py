@@ -14,6 +14,7 @@ from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, show_steps
 from shipid.errors import DataError, ShipidError
+from shipid.files import write_new
 from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
@@ -100,7 +101,6 @@ def data_import(
 def _draft_mapping(
     log: Path, names: tuple[str, ...], vessel: str | None, frame: Frame | None, out: Path | None, answer: Answer
 ) -> None:
-    from shipid.files import write_new
     from shipid.logs.guess.draft import NOT_YET, draft_mapping
 
     if out is not None:
@@ -147,7 +147,6 @@ def data_segment(
     as_json: Json = False,
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
-    from shipid.files import write_new
     from shipid.logs.catalogue import fetch_log
     from shipid.logs.guess.draft import clock_moment, segment_log, segments_text
 

@@ -10,7 +10,7 @@ import typer
 import shipid
 from shipid.cli.options import Adaptive, Folder, Kind, check_band, command_line
 from shipid.cli.outputs import check_output
-from shipid.errors import ShipidError
+from shipid.errors import DocumentError, ShipidError
 from shipid.files import TABLES
 from shipid.units import percent_text
 
@@ -104,7 +104,6 @@ def export_command(
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
     from shipid.document import bundled_documents
-    from shipid.errors import DocumentError
     from shipid.export.write import EXAMPLE_FILE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
 

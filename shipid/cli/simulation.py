@@ -14,7 +14,7 @@ from shipid.cli.options import Changes, Trust, VesselName, command_line, documen
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, MOTION, MOTION_FORMATS
 from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.files import TABLES
+from shipid.files import TABLES, write_table
 
 
 def simulate_command(
@@ -48,7 +48,6 @@ def simulate_command(
 
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
     """A log of a vessel: manoeuvres by a document."""
-    from shipid.files import write_table
     from shipid.simulation.truth import simulate_script
 
     check_output(out, endings=TABLES)

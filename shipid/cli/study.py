@@ -26,7 +26,7 @@ from shipid.cli.options import (
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import end_on_interrupt, share_text, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
-from shipid.files import TABLES
+from shipid.files import TABLES, quote_argument, write_new
 from shipid.units import level_text, plural_word
 
 if TYPE_CHECKING:
@@ -70,7 +70,6 @@ def study_new(
     as_json: Json = False,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
-    from shipid.files import quote_argument, write_new
     from shipid.study.new import draft_study
 
     if not vessel and data is None:
@@ -356,7 +355,6 @@ def _run_to_report(
 ) -> None:
     from shipid.answer.pages import ANSWER
     from shipid.answer.start import event_line
-    from shipid.files import quote_argument
     from shipid.study import run, store
     from shipid.study.check import search_words
     from shipid.study.plan import program_of

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.data.checks import root_mean_square
-from shipid.data.dataset import Dataset, stretches_of_runs, unit_of_column
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.engine.casadi import evaluate_samples, memory_along
 from shipid.simulation.log import body_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
@@ -50,29 +48,3 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset, weather: Mapping[str, fl
         shown = evaluate_samples(model, "measured", seen, values)[places]
         parts.append(pd.DataFrame({"run": run, "t": columns["t"], **dict(zip(wanted, shown, strict=True))}))
     return pd.concat(parts, ignore_index=True)
-
-
-def compare_outputs(vessel: Vessel, dataset: Dataset, weather: Mapping[str, float] | None = None) -> pd.DataFrame:
-    """Measured outputs beside the predicted ones, run by run; weather : as of `predicted_outputs`.
-
-    Returns `output`, `run`, `unit`, `measured` and `predicted` (root mean squares), `scale` (measured over predicted,
-    by least squares) and `error` (root mean square of the difference); empty without a common output.
-    """
-    predicted = predicted_outputs(vessel, dataset, weather)
-    measured = pd.concat([rows for _, rows in stretches_of_runs(dataset)], ignore_index=True)
-    table: list[dict[str, Any]] = []
-    for name in predicted.columns[2:]:
-        for run, rows in predicted.groupby("run", sort=False):
-            y, f = measured[name].to_numpy()[rows.index], rows[name].to_numpy()
-            scale = float(f @ y) / float(f @ f) if f.any() else np.inf
-            row = {
-                "output": name,
-                "run": str(run),
-                "unit": unit_of_column(name),
-                "measured": root_mean_square(y),
-                "predicted": root_mean_square(f),
-                "scale": scale,
-                "error": root_mean_square(y - f),
-            }
-            table.append(row)
-    return pd.DataFrame(table, columns=["output", "run", "unit", "measured", "predicted", "scale", "error"])

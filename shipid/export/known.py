@@ -5,7 +5,6 @@ They are arrays of CasADi with the functions of NumPy: what a method computes fo
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -44,7 +43,6 @@ class InputLayout:
     planned: tuple[str, ...]
     horizon: int
     estimates: tuple[str, ...]
-    commands: tuple[str, ...]
     physics: tuple[str, ...] = ()
 
     @property
@@ -63,11 +61,6 @@ class InputLayout:
 def column_of_entries(table: NamedExpressions, names: Sequence[str]) -> MX:
     """Entries of a table in a column, in the order of the names; what it does not hold is 0."""
     return ca.vertcat(MX(0, 1), *(table.get(name, MX(0)) for name in names))
-
-
-def all_within(values: MX, limit: float = sys.float_info.max) -> MX:
-    """Whether all values are from -limit to limit: false where one is NaN, by default also where one is infinite."""
-    return ca.sum1(ca.vec(ca.fabs(values) <= limit)) > values.numel() - 0.5
 
 
 def turn_vectors(vectors: MX, angle: MX) -> MX:
@@ -114,7 +107,8 @@ class SymbolicPhysics(Physics):
     def is_slow(self, records: MX) -> MX:
         """Whether no velocity of some carries is above that of any ship: in Python the rollout diverged."""
         num_dof = vessel_dynamics(self.ship).num_dof
-        return all_within(records[num_dof : 2 * num_dof, :], SPEED_LIMIT)
+        speeds = records[num_dof : 2 * num_dof, :]
+        return ca.sum1(ca.vec(ca.fabs(speeds) <= SPEED_LIMIT)) > speeds.numel() - 0.5  # false where one is NaN
 
     def positions(self, instants: Instants, records: MX) -> tuple[Any, Any]:
         """Positions (T, 1) [m] in the frame (11) of some carries, over ground."""

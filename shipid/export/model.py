@@ -176,5 +176,5 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
     return ExportModel(
         predictor,
         physics,
-        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, commands, given),
+        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, given),
     )

@@ -75,7 +75,6 @@ class Solution(LinearFit):
     status : `ok`, `refused` (values that the vessel's checks refuse), `not converged`, `diverged` or `stopped`.
     sentence : the status with its reason and a remedy. warnings : what the fit cannot see, one sentence each.
     effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
-    within : signal -> share of its residuals up to the threshold of huber; 1 with the squared loss.
     """
 
     vessel: Vessel
@@ -89,7 +88,6 @@ class Solution(LinearFit):
     seconds: float
     status: str
     sentence: str
-    within: Mapping[str, float]
     point: Point = field(repr=False)
     effective: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

@@ -15,9 +15,10 @@ from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
 from shipid.arguments import as_names, check_class, check_function_or_none, check_number
-from shipid.data.dataset import Array, Dataset, without_shared_moments
+from shipid.data.checks import root_mean_square
+from shipid.data.dataset import Array, Dataset, stretches_of_runs, unit_of_column, without_shared_moments
 from shipid.data.held import constant_commands, warn_of_constant_commands
-from shipid.data.outputs import compare_outputs, outputs_in_common
+from shipid.data.outputs import outputs_in_common, predicted_outputs
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
@@ -398,25 +399,25 @@ def _compare_outputs(
     pair: Mapping[str, Vessel], solution: Solution, dataset: Dataset, runs: Sequence[str]
 ) -> pd.DataFrame:
     """Measured outputs against those of the vessels, in the recorded motion; as the free runs are, in the current."""
-    part = dataset.select(runs)
-    north, east = solution.common_current
-    if not outputs_in_common(pair[AFTER], part):
-        return pd.DataFrame(columns=["output", "unit", "measured", *pair])
-    tables = {name: compare_outputs(vessel, part) for name, vessel in pair.items()}
-    if north or east:
-        flow = {"V_c": math.hypot(north, east), "beta_c": math.atan2(east, north)}
-        tables[AFTER] = compare_outputs(with_current(pair[AFTER], solution.settings, (), (north, east))[0], part, flow)
+    part, current = dataset.select(runs), solution.common_current
+    names, predicted = outputs_in_common(pair[AFTER], part), dict[str, pd.DataFrame]()
+    measured = pd.concat([rows for _, rows in stretches_of_runs(part)], ignore_index=True)
+    for name, vessel in pair.items() if names else ():
+        known = any(current) and name == AFTER
+        flow = {"V_c": math.hypot(*current), "beta_c": math.atan2(*current[::-1])} if known else {}
+        sea = with_current(vessel, solution.settings, (), current)[0] if known else vessel
+        predicted[name] = predicted_outputs(sea, part, flow)
 
-    def level(name: str, output: str, column: str) -> float:
-        here = tables[name][tables[name]["output"] == output]
-        return float(np.sqrt((here[column] ** 2).mean()))
+    def level(values: pd.Series[float]) -> float:
+        each = [root_mean_square(np.asarray(one)) for _, one in values.groupby(measured["run"], sort=False)]
+        return float(np.sqrt((pd.Series(each) ** 2).mean()))
 
-    first = tables[AFTER].drop_duplicates("output")
-    return pd.DataFrame(
-        {"output": output, "unit": unit, "measured": level(AFTER, output, "measured")}
-        | {name: level(name, output, "error") for name in pair}
-        for output, unit in zip(first["output"], first["unit"], strict=True)
-    )
+    rows = [
+        {"output": output, "unit": unit_of_column(output), "measured": level(measured[output])}
+        | {name: level(measured[output] - table[output]) for name, table in predicted.items()}
+        for output in names
+    ]
+    return pd.DataFrame(rows, columns=["output", "unit", "measured", *pair])
 
 
 def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:

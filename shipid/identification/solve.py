@@ -342,7 +342,6 @@ def _build_solution(problem: Problem, result: Result, objective_start: float, se
             for path, scales in zip(unknown.paths, unknown.scale, strict=True)
         ),
         point=result.point,
-        within=end.within(settings.linear_from),
     )
 
 

@@ -134,7 +134,11 @@ def exchange_structure(
     if name == PRESENT:
         return HullExchange(vessel, settings, dict.fromkeys(AXES, 0.0))
     structure = STRUCTURES[name]
-    rudders = _rudders_behind_propellers(vessel) if structure.rudder else {}
+    rudders = {
+        f"thruster.{rudder}": block
+        for rudder, block in vessel.document.get("thruster", {}).items()
+        if structure.rudder and block.get("kind") == "rudder" and not block.get("off", False)
+    }
     paths = [*structure.hull, *(f"{rudder}.{term}" for rudder in rudders for term in structure.rudder)]
     states = _sample_states(vessel, dataset, runs)
     bare = _vessel_without_coefficients(vessel, structure, rudders, paths, float(np.median(states["u"])))
@@ -144,14 +148,6 @@ def exchange_structure(
     begun = np.where(positive, np.maximum(c, LEAST * sizes), begun)
     result = bare.with_values(dict(zip(paths, begun.tolist(), strict=True)))
     return HullExchange(result, _settings_of_exchange(vessel, result, settings, rudders, paths, begun, sizes), misfit)
-
-
-def _rudders_behind_propellers(vessel: Vessel) -> dict[str, Mapping[str, Any]]:
-    return {
-        f"thruster.{name}": block
-        for name, block in vessel.document.get("thruster", {}).items()
-        if block.get("kind") == "rudder" and not block.get("off", False)
-    }
 
 
 def _vessel_without_coefficients(

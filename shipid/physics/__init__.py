@@ -106,21 +106,24 @@ TERMS |= {
         propeller.propeller_wrench,
         gives={
             "wash": propeller.propeller_wash,
-            "thrust": propeller.propeller_thrust,
+            "thrust": propeller.shaft_thrust(propeller.propeller_wrench),
             "torque": propeller.propeller_torque,
         },
     ),
     "thruster.controllable_pitch": Term(
         propeller.controllable_pitch,
-        gives={"wash": propeller.controllable_wash, "thrust": propeller.controllable_thrust},
+        gives={"wash": propeller.controllable_wash, "thrust": propeller.shaft_thrust(propeller.controllable_pitch)},
     ),
     "thruster.four_quadrant": Term(
         propeller.four_quadrant,
-        gives={"wash": propeller.four_quadrant_wash, "thrust": propeller.four_quadrant_shaft_thrust},
+        gives={"wash": propeller.four_quadrant_wash, "thrust": propeller.shaft_thrust(propeller.four_quadrant)},
     ),
     "thruster.quadratic": Term(
         propeller.quadratic_propeller_wrench,
-        gives={"wash": propeller.quadratic_wash, "thrust": propeller.quadratic_shaft_thrust},
+        gives={
+            "wash": propeller.quadratic_wash,
+            "thrust": propeller.shaft_thrust(propeller.quadratic_propeller_wrench),
+        },
     ),
     "thruster.service_speed": Term(propeller.service_speed_wrench),
     "thruster.rudder": Term(rudder.rudder_wrench, gives={"normal_force": rudder.normal_force}),

@@ -55,20 +55,12 @@ class Monomial:
         return product
 
 
-def monomial_names(alphabet: str | tuple[str, ...], axes: str = AXES) -> str:
-    """Regular expression of the coefficient names whose factors are words of the alphabet."""
-    return rf"([{axes}])_((?:{_factor_pattern(alphabet)})+)" if axes else rf"()((?:{_factor_pattern(alphabet)})+)"
-
-
-def _factor_pattern(alphabet: str | tuple[str, ...]) -> str:
-    word = f"(?:{'|'.join(alphabet)})"
-    return rf"{word}|\|{word}\|"
-
-
 @cache
 def parse_monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
     """Parse a coefficient name whose factors are words of the alphabet; ValueError shows the expected form."""
-    parts = re.fullmatch(monomial_names(alphabet, axes), name)
+    word = f"(?:{'|'.join(alphabet)})"
+    factor = rf"{word}|\|{word}\|"
+    parts = re.fullmatch(rf"{f'([{axes}])_' if axes else '()'}((?:{factor})+)", name)
     if parts is None:
         start = f"one of {', '.join(axes)}, an underscore, then " if axes else ""
         one, other = ("v", "r") if {"v", "r"} <= {*alphabet} else (alphabet[0], alphabet[-1])
@@ -76,20 +68,16 @@ def parse_monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES)
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
-    tokens = re.findall(_factor_pattern(alphabet), parts[2])
+    tokens = re.findall(factor, parts[2])
     return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in tokens))
 
 
 @dataclass(frozen=True)
 class Grammar:
-    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name.
-
-    names : regular expression of the valid names, for editors; `check_name` says what is wrong with another.
-    """
+    """Rules of an open table of coefficients: the valid names, and the unit that follows from a name."""
 
     check_name: Callable[[str], Monomial]
     unit: Callable[[str], str]
-    names: str
 
     def check(self, names: Names) -> Names:
         """The names as they are; ValueError for the first invalid one, or for a second name of one monomial."""
@@ -229,15 +217,13 @@ def advance_monomial(name: str) -> Monomial:
     return Monomial("", ()) if name == "1" else parse_monomial(name, "J", axes="")
 
 
-_MOTIONS, _OF_HULL = monomial_names((HEEL, *MOTIONS)), monomial_names(DEVIATIONS[:-1])
-_RUDDER_FLOW = rf"(?=(?:[^c]*c){{2}}[^c]*$){monomial_names(('beta', 'delta', 'c'))}"
-DERIVATIVES = Grammar(hull_derivative, derivative_unit, _MOTIONS)
-PRIME_DERIVATIVES = Grammar(hull_derivative, lambda _: "prime", _MOTIONS)
-BIS_DERIVATIVES = Grammar(hull_derivative, lambda _: "bis", _MOTIONS)
-HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime", _OF_HULL)
-RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime", rf"(?=.*delta){monomial_names(DEVIATIONS)}")
-ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit, ACCELERATIONS)
-RUDDER_FLOWS = Grammar(rudder_flow, lambda _: "prime", _RUDDER_FLOW)
-CROSS_FLOWS = Grammar(cross_flow_monomial, lambda _: "prime", monomial_names("vr", axes=""))
-THRUST = Grammar(thrust_monomial, lambda _: "-", rf"1|{monomial_names('Jyt', axes='')}")
-ADVANCE = Grammar(advance_monomial, lambda _: "-", rf"1|{monomial_names('J', axes='')}")
+DERIVATIVES = Grammar(hull_derivative, derivative_unit)
+PRIME_DERIVATIVES = Grammar(hull_derivative, lambda _: "prime")
+BIS_DERIVATIVES = Grammar(hull_derivative, lambda _: "bis")
+HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime")
+RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime")
+ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
+RUDDER_FLOWS = Grammar(rudder_flow, lambda _: "prime")
+CROSS_FLOWS = Grammar(cross_flow_monomial, lambda _: "prime")
+THRUST = Grammar(thrust_monomial, lambda _: "-")
+ADVANCE = Grammar(advance_monomial, lambda _: "-")

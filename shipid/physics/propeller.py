@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Annotated, Any
 
@@ -147,10 +147,14 @@ def propeller_wrench(
     return wrench
 
 
-@wraps(propeller_wrench, assigned=("__annotations__",))
-def propeller_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
-    """Thrust [N] in the shaft of `propeller_wrench`: before the thrust deduction."""
-    return propeller_wrench(nu_r, n, **{**numbers, "t_P": 0.0})[0]
+def shaft_thrust(wrench: Callable[..., SX]) -> Callable[..., SX]:
+    """The function of the thrust [N] in the shaft of a screw with this wrench: before the thrust deduction."""
+
+    @wraps(wrench)
+    def thrust(*signals: SX, **numbers: Any) -> SX:
+        return wrench(*signals, **{**numbers, "t_P": 0.0})[0]
+
+    return thrust
 
 
 def propeller_torque(
@@ -264,12 +268,6 @@ def controllable_pitch(
     return wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
 
 
-@wraps(controllable_pitch, assigned=("__annotations__",))
-def controllable_thrust(nu_r: SX, n: SX, pitch: SX, **numbers: Any) -> SX:
-    """Thrust [N] in the shaft of `controllable_pitch`."""
-    return controllable_pitch(nu_r, n, pitch, **{**numbers, "t_P": 0.0})[0]
-
-
 def controllable_wash(
     nu_r: SX,
     n: SX,
@@ -350,12 +348,6 @@ def quadratic_propeller_wrench(
     thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
     ahead = wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
     return ahead + thrust * column_vector(0, Y_T, 0, -z * Y_T, 0, N_T)
-
-
-@wraps(quadratic_propeller_wrench, assigned=("__annotations__",))
-def quadratic_shaft_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
-    """Thrust [N] in the shaft of `quadratic_propeller_wrench`."""
-    return quadratic_propeller_wrench(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def quadratic_wash(
@@ -439,12 +431,6 @@ def four_quadrant(
     )
     thrust = rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
     return wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
-
-
-@wraps(four_quadrant, assigned=("__annotations__",))
-def four_quadrant_shaft_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
-    """Thrust [N] in the shaft of `four_quadrant`."""
-    return four_quadrant(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def four_quadrant_wash(

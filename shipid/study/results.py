@@ -158,24 +158,9 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
 def _read_part_cells(folder: Path, plan: Plan) -> pd.DataFrame:
     """The rows of one run, with the name that figures give their models."""
     seals.check_seals(folder, "batches/")
-    cells = _with_errors_at_horizon(folder, store.read_rows(folder, plan))
+    cells = store.read_rows(folder, plan)
     labels = [model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     return cells.assign(model=labels)
-
-
-def _with_errors_at_horizon(folder: Path, cells: pd.DataFrame) -> pd.DataFrame:
-    """The rows of cells; those of an earlier version get the errors at the horizon from the paths that it kept."""
-    without = cells[cells["status"].eq("ok") & cells["H_end"].isna()]
-    if without.empty:
-        return cells
-    test, physics, *_ = store.read_test(folder)
-    for index, cell, foundation in without[["cell", "foundation"]].itertuples():
-        predicted = read_arrays(store.paths_file(folder, cell))["paths"]
-        for name, path in (("H", predicted), ("A", physics.get(foundation))):
-            if path is not None and np.isfinite(cells.loc[index, name]):
-                known = summarise_errors(position_error(path, test.future))
-                cells.loc[index, [f"{name}_end", f"{name}_end_90"]] = known["end"], known["end_90"]
-    return cells
 
 
 def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:

@@ -332,9 +332,7 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     rows = [row for file in files for row in read_json(file)]
     if not rows:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = pd.DataFrame(rows)
-    for name in METRICS:
-        frame[name] = frame[name].astype(float) if name in frame else np.nan
+    frame = pd.DataFrame(rows).astype(dict.fromkeys(METRICS, float))
     pairs = [(name, way.name) for name, way in plan.pairs] if plan is not None else []
     place = {pair: number for number, pair in enumerate(pairs)}
     frame["place"] = [place.get(pair, 0) for pair in zip(frame["foundation"], frame["method"], strict=True)]

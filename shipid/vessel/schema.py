@@ -249,12 +249,7 @@ def _number_type(parameter: Parameter) -> Any:
 
 
 def _table_type(grammar: Grammar) -> Any:
-    named = Field(json_schema_extra={"propertyNames": {"pattern": _whole_pattern(grammar.names)}})
-    return Annotated[dict[str, FiniteFloat], AfterValidator(grammar.check), named]
-
-
-def _whole_pattern(names: str) -> str:
-    return f"^(?:{names})$"
+    return Annotated[dict[str, FiniteFloat], AfterValidator(grammar.check)]
 
 
 def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[VesselBlock]:
@@ -264,9 +259,7 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
     config: dict[str, Any] = {}
     for parameter in declared:
         if parameter.kind == "open" and isinstance(parameter.unit, Grammar):
-            patterns = {_whole_pattern(parameter.unit.names): {"type": "number"}}
-            editors = {"patternProperties": patterns, "additionalProperties": False}
-            config = {"extra": "allow", "json_schema_extra": editors}
+            config = {"extra": "allow", "json_schema_extra": {"additionalProperties": False}}  # on a page of keys
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(parameter.unit))
             continue
@@ -360,14 +353,9 @@ def _keys_of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
 
-def vessel_model(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
-    """Pydantic model of a whole vessel document, with the terms of installed packages that it names.
-
-    Without a document it has those of all packages: its JSON schema serves editors.
-    """
-    if document is None:
-        TERMS.load_all()
-    for _, key, _ in () if document is None else (*term_blocks(document), *term_blocks(document, off=True)):
+def vessel_model(document: Mapping[str, Any]) -> type[BaseModel]:
+    """Pydantic model of a whole vessel document, with the terms of installed packages that it names."""
+    for _, key, _ in (*term_blocks(document), *term_blocks(document, off=True)):
         TERMS.get(key)
     return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(rows_of_role("command")))
 

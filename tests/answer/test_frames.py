@@ -76,7 +76,7 @@ def test_commands_have_their_words_once(names: tuple[str, str], expected: list[s
 
 
 def test_envelope_in_sailors_units(read: Results) -> None:
-    frame = frames.envelope_frame(read).set_index(["set", "quantity"])
+    frame = report_content(read).envelope.set_index(["set", "quantity"])
     columns = read.test.columns
     assert frame.loc[("test", "port.n"), "max"] == pytest.approx(columns["port.n"].max() * 60)
     assert frame.loc[("test", "r"), "min"] == pytest.approx(np.degrees(columns["r"].min()))

@@ -3,12 +3,9 @@ import pytest
 import torch
 
 from shipid.errors import DataError
-from shipid.hybrid.compensator import (
-    Compensator,
-    Network,
-    Normaliser,
-)
+from shipid.hybrid.compensator import Compensator, Network
 from shipid.hybrid.features import Inputs, choose_features, feature_table
+from shipid.hybrid.units import VaryingInputs
 from tests.hybrid.tasks import azimuth_columns, compensation
 
 COMMANDS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
@@ -26,7 +23,9 @@ def compensator(columns):
     for fold in range(2):
         layers = tuple((rng.normal(size=(i, o)), rng.normal(size=o)) for i, o in ((7, 5), (5, 5), (5, 8)))
         seen = {name: values[fold::2] for name, values in table.items()}
-        networks.append(Network(features, Normaliser.fit(seen, tuple(features)), rng.normal(size=(6, 4)), layers))
+        networks.append(
+            Network(features, VaryingInputs.of(seen, mirror=False).normaliser, rng.normal(size=(6, 4)), layers)
+        )
     return Compensator(Inputs(COMMANDS), tuple(networks), {"layers": 2, "units": 5, "learning_rate": 0.01})
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
-from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.modules import Alarm, Modules, module_accelerations, modules_of, physics_without_modules
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stepping import step_alone
+from shipid.hybrid.units import VaryingInputs
 from shipid.vessel.load import load_vessel
 from tests.hybrid.worlds import fitted, ship, world
 
@@ -69,7 +69,7 @@ def test_another_ship_is_refused(here, corrector):
 def test_the_alarm_is_silent_on_its_data_and_between_runs():
     rng = np.random.default_rng(0)
     table = {"u": rng.normal(size=200), "v": rng.normal(size=200)}
-    alarm = Alarm.fit(table, Normaliser.fit(table, ("u", "v")), 40, np.repeat(["a", "b"], 100))
+    alarm = Alarm.fit(table, VaryingInputs.of(table, mirror=False).normaliser, 40, np.repeat(["a", "b"], 100))
     np.testing.assert_array_equal(alarm.weight(table, 1.0), 1.0)
     edge = {"u": np.array([alarm.radius / 2, 100.0, np.nan]), "v": np.zeros(3)}
     np.testing.assert_array_equal(alarm.weight(edge, 1.0), [1.0, 0.0, 0.0])

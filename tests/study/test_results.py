@@ -11,7 +11,7 @@ import pytest
 
 from shipid import figures
 from shipid.study.plan import read_plan, run_command
-from shipid.study.results import Results, _with_errors_at_horizon, read_cells, read_results
+from shipid.study.results import Results, read_cells, read_results
 
 
 @pytest.fixture(scope="module")
@@ -46,12 +46,3 @@ def test_the_command_reproduces_the_study(read: Results) -> None:
     assert run_command(changed) == "shipid study run quick --set 'grid.N_D=[10]' --set 'question=\"How far?\"'"
     asked = read_plan("quick", {"question": "How good is the captain's model?"})
     assert shlex.split(run_command(asked))[-1] == 'question="How good is the captain\'s model?"'
-
-
-def test_cells_of_an_earlier_version_get_their_error_at_the_horizon(tiny_run: Path) -> None:
-    """From the paths that it kept: to the digit what is written now."""
-    now = read_cells(tiny_run)
-    names = ["A_end", "A_end_90", "H_end", "H_end_90"]
-    assert (now["H_end"] > now["H"]).all(), "errors grow over the horizon"
-    again = _with_errors_at_horizon(tiny_run, now.assign(**dict.fromkeys(names, np.nan)))
-    pd.testing.assert_frame_equal(again, now)
