@@ -67,7 +67,6 @@ class StudiedShip:
     truth: Vessel
     physics: Vessel
     particulars: Particulars | None
-    bundled: bool = True
     sea: Mapping[str, float] | None = None
 
 
@@ -89,7 +88,7 @@ def studied_ship(name: str, seed: int, drawn: int) -> StudiedShip:
     if name not in BUNDLED:
         ship = drawn_ships(seed, drawn)[int(name.rpartition("-")[2])]
         vessel = ship.vessel()
-        return StudiedShip(name, ship.type, vessel, vessel, ship.particulars, bundled=False)
+        return StudiedShip(name, ship.type, vessel, vessel, ship.particulars)
     truth, sea = IN_WAVES.get(name, (name, None))
     vessel = load_vessel(name)
     return StudiedShip(name, BUNDLED[name], load_vessel(truth), vessel, _known_particulars(vessel), sea=sea)
@@ -263,34 +262,27 @@ def study_ship(name: str, seed: int = 0, drawn: int = DRAWN, amounts: Iterable[i
     """Cells of a ship, see `CELL_COLUMNS`; ShipidError where it cannot be studied."""
     ship = studied_ship(name, seed, drawn)
     plan, prepared = prepare_ship(plan_ship(ship, seed, drawn, amounts))
-    speed, length = vessel_service_speed(ship.physics), float(ship.physics.length or 0)
-    steps = prepared.test.horizon
-    ends = {ahead: round(steps * ahead / max(HORIZONS)) for ahead in HORIZONS}
-    alone = {one: position_error(paths, prepared.test.future) for one, paths in prepared.test_paths.items()}
-    same = {
-        "ship": name, "type": ship.type, "bundled": ship.bundled, "length": length, "speed": speed,
-        "froude": speed / math.sqrt(GRAVITY * length),
-    }  # fmt: skip
+    test, speed, length = prepared.test, vessel_service_speed(ship.physics), float(ship.physics.length or 0)
+    alone = {one: position_error(paths, test.future) for one, paths in prepared.test_paths.items()}
+    results = [(one, 0, error) for one, error in alone.items() if one != NO_MODEL]
+    results += [
+        (str(cell.row["foundation"]), unit.batch.N_D, position_error(cell.paths, test.future))
+        for unit in plan.units
+        for cell in run_unit(plan, prepared, unit, "cpu")
+        if cell.paths is not None
+    ]
     kinds = {one.name: one.family.partition("-")[0] for one in prepared.foundations}
-    rows = []
-
-    def add(foundation: str, N_D: int, error: Any) -> None:
-        for ahead, end in ends.items():
-            known = {key: float(alone[key][:end].mean()) for key in (foundation, "nominal")}
-            rows.append({
-                **same, "foundation": foundation, "kind": kinds[foundation],
-                "A": math.nan if foundation == NO_MODEL else known[foundation], "N_D": N_D, "ahead": ahead,
-                "H": float(error[:end].mean()), "baseline": float(prepared.naive[:end].mean()),
-                "floor": known["nominal"],
-            })  # fmt: skip
-
-    for foundation, error in alone.items():
-        if foundation != NO_MODEL:
-            add(foundation, 0, error)
-    for unit in plan.units:
-        for cell in run_unit(plan, prepared, unit, "cpu"):
-            if cell.paths is not None:
-                add(cell.row["foundation"], unit.batch.N_D, position_error(cell.paths, prepared.test.future))
+    rows = [
+        {
+            "ship": name, "type": ship.type, "bundled": name in BUNDLED, "length": length, "speed": speed,
+            "froude": speed / math.sqrt(GRAVITY * length), "foundation": foundation, "kind": kinds[foundation],
+            "A": math.nan if foundation == NO_MODEL else float(alone[foundation][:end].mean()), "N_D": N_D,
+            "ahead": ahead, "H": float(error[:end].mean()), "baseline": float(prepared.naive[:end].mean()),
+            "floor": float(alone["nominal"][:end].mean()),
+        }
+        for foundation, N_D, error in results
+        for ahead, end in ((ahead, round(test.horizon * ahead / max(HORIZONS))) for ahead in HORIZONS)
+    ]  # fmt: skip
     return pd.DataFrame(rows)
 
 
@@ -332,17 +324,10 @@ def run_ships(
             continue
         with replace_whole(folder / f"{name}.parquet") as file:
             cells.to_parquet(file)
-        count = write_cells(folder, drawn)
-        yield f"{name}: {len(cells)} cells; {count} of {len(BUNDLED) + drawn} ships"
-
-
-def write_cells(folder: Path, drawn: int = DRAWN) -> int:
-    """Write the cells of all finished ships as one table, Parquet and CSV; return the number of ships."""
-    files = [folder / f"{name}.parquet" for name in ship_names(drawn)]
-    done = [pd.read_parquet(file) for file in files if file.exists()]
-    table = pd.concat(done, ignore_index=True)
-    with replace_whole(folder / "cells.parquet") as file:
-        table.to_parquet(file)
-    with replace_whole(folder / "cells.csv") as file:
-        table.to_csv(file, index=False)
-    return len(done)
+        files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").exists()]
+        table = pd.concat(map(pd.read_parquet, files), ignore_index=True)
+        with replace_whole(folder / "cells.parquet") as file:
+            table.to_parquet(file)
+        with replace_whole(folder / "cells.csv") as file:
+            table.to_csv(file, index=False)
+        yield f"{name}: {len(cells)} cells; {len(files)} of {len(BUNDLED) + drawn} ships"

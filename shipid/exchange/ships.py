@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -105,11 +105,6 @@ class DrawnShip:
     particulars: Particulars
     dice: Dice
 
-    @property
-    def froude(self) -> float:
-        """Service speed over sqrt(g L)."""
-        return self.particulars.service / math.sqrt(GRAVITY * self.particulars.length)
-
     def vessel(self, like: Particulars | None = None) -> Vessel:
         """The truth.
 
@@ -119,14 +114,10 @@ class DrawnShip:
         if like is None:
             return check_document(_document(given, self.dice, 1.0), f"{self.name}.toml")
         ratio = like.length / given.length
-        scaled = Particulars(
-            like.length, ratio * given.beam, ratio * given.draught, given.block,
-            math.sqrt(ratio) * given.service, given.propulsor, given.ship_type, shafts=given.shafts,
-        )  # fmt: skip
-        vessel = check_document(_document(scaled, self.dice, 1.0), f"{self.name}.toml")
-        n = balanced_shaft(Controls(vessel), scaled.service)
-        assert like.rpm is not None
-        share = like.rpm / 60 / (n or 1.0) * scaled.service / like.service
+        speed = math.sqrt(ratio) * given.service
+        scaled = replace(given, length=like.length, beam=ratio * given.beam, draught=ratio * given.draught, speed=speed)
+        n = balanced_shaft(Controls(check_document(_document(scaled, self.dice, 1.0), self.name)), speed)
+        share = (like.rpm or 0.0) / 60 / (n or 1.0) * speed / like.service
         return check_document(_document(scaled, self.dice, share), f"{self.name}.toml")
 
 
@@ -137,9 +128,8 @@ def draw_ship(seed: int, number: int) -> DrawnShip:
         dice = Dice((seed, "ship", number, counter))
         ship = DrawnShip(f"drawn-{number:02d}", kind, _draw_particulars(SHIP_TYPES[kind], dice), dice)
         if holds_turn(vessel := ship.vessel(), ship.particulars):
-            n = balanced_shaft(Controls(vessel), ship.particulars.service)
-            assert n is not None
-            return DrawnShip(ship.name, kind, Particulars(**{**vars(ship.particulars), "rpm": 60 * n}), dice)
+            n = balanced_shaft(Controls(vessel), ship.particulars.service) or 0.0
+            return replace(ship, particulars=replace(ship.particulars, rpm=60 * n))
     raise ShipidError(f"no ship of {MOST_DRAWS} draws of type {kind} holds a turn: take another seed")
 
 
@@ -227,7 +217,7 @@ def _document(given: Particulars, dice: Dice, shaft: float) -> dict[str, Any]:
     wetted = 2.6 * math.sqrt(given.volume * L)  # Taylor
     friction = ittc_friction(U, L, NU) + dice("C_A", 0.0, 5e-4) * (L > 10)
     residuary = dice("C_R", 0.5, 1.8) * 1e-3  # Guldhammer and Harvald (1974): of ordinary forms at a service speed
-    blocks = {
+    return {
         "name": "drawn", "dof": 3,
         "particulars": {"L_pp": L, "B": B, "T": T, "C_b": given.block, "U_0": U},
         "constants": {"rho": RHO_SEA, "rho_a": RHO_AIR},
@@ -249,7 +239,6 @@ def _document(given: Particulars, dice: Dice, shaft: float) -> dict[str, Any]:
         "wind": _wind(given, dice),
         "thruster": dict(_thrusters(given, dice, shaft)),
     }  # fmt: skip
-    return blocks
 
 
 def _wind(given: Particulars, dice: Dice) -> dict[str, Any]:

@@ -31,7 +31,13 @@ def test_every_type_is_drawn_within_its_ranges(fleet: list[DrawnShip]) -> None:
     assert {ship.type for ship in fleet} == set(SHIP_TYPES)
     for ship in fleet:
         kind, given = SHIP_TYPES[ship.type], ship.particulars
-        numbers = (given.length, ship.froude, given.length / given.beam, given.beam / given.draught, given.block)
+        numbers = (
+            given.length,
+            given.service / np.sqrt(9.81 * given.length),
+            given.length / given.beam,
+            given.beam / given.draught,
+            given.block,
+        )
         ranges = (kind.length, kind.froude, kind.slender, kind.beamy, kind.block)
         assert all(
             low <= value * (1 + 1e-9) and value <= high * (1 + 1e-9)
@@ -78,7 +84,7 @@ def test_the_truth_is_not_what_the_template_gives(fleet: list[DrawnShip]) -> Non
 def test_a_sister_has_the_length_and_the_shaft_speed_of_the_ship(fleet: list[DrawnShip]) -> None:
     one, other = fleet[0].particulars, fleet[2]
     sister = other.vessel(like=one)
-    speed = other.froude * np.sqrt(9.81 * one.length)
+    speed = other.particulars.service * np.sqrt(one.length / other.particulars.length)
     n = balanced_shaft(Controls(sister), float(speed))
     assert sister.length == one.length
     assert 60 * float(n or 0) * one.service / speed == pytest.approx(one.rpm, rel=1e-3)
