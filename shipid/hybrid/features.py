@@ -32,7 +32,9 @@ def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) ->
     for name, values in planned.items():
         component, _, signal = name.rpartition(".")
         for number, part in enumerate(np.array_split(values, min(PLAN_PARTS, len(values))), start=1):
-            means[f"{component}.planned-{number}.{signal}"] = part.mean(axis=0) - columns[name]
+            change = part.mean(axis=0) - columns[name]
+            rounding = TOLERANCE * np.abs(columns[name])  # of a mean of equal orders: no change
+            means[f"{component}.planned-{number}.{signal}"] = np.where(np.abs(change) > rounding, change, 0.0)
     return means
 
 

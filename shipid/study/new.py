@@ -99,7 +99,7 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     """
     loaded = {_vessel_key(name, out): load_vessel(name) for name in vessels}
     if data is None:
-        return _simulated_study(loaded, out)
+        return draft_simulated(loaded, out)
     dataset = read_dataset(data)
     for vessel in loaded.values():
         check_columns(vessel, dataset.frame.columns, str(data))
@@ -116,17 +116,19 @@ def draft_families(vessel: str, members: int, out: Path) -> str:
     return _comment([words]) + tomlkit.dumps({"vessel": _vessel_key(vessel, out), "family": blocks})
 
 
-def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -> tuple[float, str]:
+def horizon_of(
+    length: float | None, speed: float, durations: Sequence[float], lengths: float = LENGTHS_AHEAD
+) -> tuple[float, str]:
     """Horizon [s], and why: some ship lengths at the usual speed, but a part of the median run."""
     longest = float(np.median(durations)) * SHARE_OF_RUN
     if length is None or speed <= 0:
         why = "a third of the median run: without particulars.L_pp and speed there is no L/U"
         return float(f"{longest:.2g}"), why
-    wanted = LENGTHS_AHEAD * length / speed
+    wanted = lengths * length / speed
     chosen = float(f"{min(wanted, longest):.2g}")
     why = (
         f"{chosen:g} s, in which the ship runs {chosen * speed / length:.2g} ship lengths at {speed:.3g} m/s "
-        f"(L/U = {length / speed:.3g} s): over about {LENGTHS_AHEAD:g} its dynamics decide, later the next orders"
+        f"(L/U = {length / speed:.3g} s): over about {lengths:g} its dynamics decide, later the next orders"
     )
     short = f"; no longer than a third of the median run, {3 * longest:.3g} s" if wanted > longest else ""
     return chosen, why + short
@@ -335,8 +337,13 @@ def _inaccurate_blocks(vessel: Vessel) -> list[dict[str, Any]]:
     return blocks
 
 
-def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
-    """A study of degraded models of the first vessel, which makes the truth (method, section 4)."""
+def draft_simulated(
+    vessels: Mapping[str, Vessel], out: Path, lengths: float = LENGTHS_AHEAD, steps: int | None = None
+) -> Draft:
+    """A study of degraded models of a vessel, which makes the truth (method, section 4).
+
+    vessels : the vessel, by the name that the study gives it. lengths : horizon in ship lengths, of so many `steps`.
+    """
     if len(vessels) > 1:
         message = "one vessel makes the truth of a simulated study: give one, or --data with recorded runs"
         raise ShipidError(message, path="--vessel")
@@ -351,14 +358,14 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         rpm = shaft_speed(controls, service) / RPM
     except ShipidError as error:
         raise DocumentError(error.message, file=vessel.file, path="particulars.U_0") from None
-    horizon, why = horizon_of(length, 0.75 * service, [np.inf])
-    step = step_of(horizon, 0.0)
+    horizon, why = horizon_of(length, 0.75 * service, [np.inf], lengths)
+    step = horizon / steps if steps else step_of(horizon, 0.0)
     ahead = round(horizon / step) * step
     amounts = amounts_of_data(MANOEUVRES - TEST_MANOEUVRES)
-    method = _proposed_method(horizon / LENGTHS_AHEAD, step, np.inf)
+    method = _proposed_method(horizon / lengths, step, np.inf)
     past, ship_time = _past_of_method(method), length / service
     duration = float(f"{ahead + INSTANTS_A_MANOEUVRE * step:.6g}")
-    fine = min(_round_number_below(ship_time / STEPS_A_LENGTH), step / 10)
+    fine = step / 10 if steps else min(_round_number_below(ship_time / STEPS_A_LENGTH), step / 10)
     question = f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict its path?"
     fixed = [
         Choice("question", question),

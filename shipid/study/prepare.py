@@ -23,6 +23,7 @@ from shipid.data.dataset import (
     keep_rows,
     read_dataset,
     rows_outside_spans,
+    stretch_columns,
     stretches_by_run,
     stretches_of_runs,
 )
@@ -549,14 +550,17 @@ def not_measured(vessel: Vessel, windows: Windows) -> list[str]:
 
 def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:
     """Hidden actuator states (S,) at the start of each window, modelled from the earlier orders; None if none."""
+    if not vessel_dynamics(vessel).memory:
+        return None
     tracks: dict[str, list[tuple[Array, dict[str, Array]]]] = {}
-    for run, rows in stretches_of_runs(dataset):
-        states = states_along(vessel, dataset.commands, rows)
-        if states is None:
-            return None
-        tracks.setdefault(run, []).append((rows["t"].to_numpy(), states))
+    spans = windows.spans
+    for run, columns in stretch_columns(dataset):
+        if run in spans:
+            states = memory_along(vessel, {name: columns[name] for name in dataset.commands}, columns["t"])
+            assert states is not None
+            tracks.setdefault(run, []).append((columns["t"], states))
     result = {name: np.full(len(windows), np.nan) for name in next(iter(tracks.values()))[0][1]}
-    for run in windows.spans:
+    for run in spans:
         mask = windows.run == run
         for t, states in tracks[run]:
             slack = clock_slack(t)

@@ -406,11 +406,17 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray,
     return windows, physics, arrays["naive"], regression
 
 
-def shard_folder(folder: Path, shard: tuple[int, int]) -> Path:
-    """Where shard (i, n) of a run is; ResultError unless i is 1 to n."""
+def check_shard(shard: tuple[int, int]) -> tuple[int, int]:
+    """Number and count of shard (i, n); ResultError unless i is 1 to n."""
     number, count = shard
     if not 1 <= number <= count:
         raise ResultError(f"{number}/{count}: must be i/n, i from 1 to n, such as 3/20", path="--shard")
+    return shard
+
+
+def shard_folder(folder: Path, shard: tuple[int, int]) -> Path:
+    """Where shard (i, n) of a run is; ResultError unless i is 1 to n."""
+    number, count = check_shard(shard)
     return folder / SHARDS / f"{number}-of-{count}"
 
 

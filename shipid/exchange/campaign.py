@@ -1,0 +1,333 @@
+"""The study over ships: every bundled ship and drawn ones, each with the same families, amounts of data and horizons.
+
+A ship is a unit: it is the same on every worker, in any order, and its cells are stored when it is finished.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from shipid.errors import DivergenceError, ResultError, ShipidError
+from shipid.exchange.ships import Dice, DrawnShip, draw_ship
+from shipid.files import make_folder, read_json, replace_whole, write_json
+from shipid.metrics import position_error
+from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
+from shipid.study.declared import NO_MODEL
+from shipid.study.new import draft_simulated
+from shipid.study.plan import Plan, build_plan
+from shipid.study.prepare import PreparedStudy, obtain_runs, prepare
+from shipid.study.run import run_unit
+from shipid.study.store import check_shard
+from shipid.study.workers import on_workers
+from shipid.units import GRAVITY
+from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.perturb import derivative_order
+from shipid.vessel.template import Particulars, first_guess
+
+BUNDLED = {
+    "mariner": "cargo",
+    "otter": "usv",
+    "gunnerus-28.9": "research",
+    "esso-190k": "tanker",
+    "kvlcc2-l7": "model",
+    "container-175": "container",
+    "naval-51": "naval",
+    "cybership2": "model",
+    "supply-vessel": "offshore",
+}
+"""Ships that shipid ships, one file of each, and their types."""
+IN_WAVES = {"gunnerus-28.9": ("gunnerus-28.9-6dof", {"H_s": 1.0, "T_p": 5.0})}  # truth of it, and the sea of `quick`
+DRAWN = 30
+AMOUNTS, TESTS = (1, 2, 4, 8, 16, 32, 64), 12  # runs for training and for the test
+HORIZONS = (1.0, 2.0, 4.0)  # ship lengths at 0.75 of the service speed
+ZIGZAG = "zigzag"
+STEPS = 32  # of the horizon
+SAMPLES = 12  # instants of a run
+PARTED = 2.1  # windows between the first and the last instant of a run: a single one can be parted to validate
+COUPLING = ("X_vr", "Y_r", "Y_ur", "N_v", "N_uv")
+DRIVING, STEERING = ("T_nn", "T_nu", "k_T", "X_u", "X_uu", "X_uuu", "F_2"), ("f_alpha",)
+CROSS_FLOW = "C_d"
+
+
+@dataclass(frozen=True)
+class StudiedShip:
+    """A ship of the study: its truth, its physics in 3 degrees of freedom, particulars where they are known, a sea."""
+
+    name: str
+    type: str
+    truth: Vessel
+    physics: Vessel
+    particulars: Particulars | None
+    sea: Mapping[str, float] | None = None
+
+
+def ship_names(drawn: int = DRAWN) -> list[str]:
+    """Names of all ships; bundled and drawn ones alternate, so that a part of them is already mixed."""
+    every = max(drawn // len(BUNDLED), 1)
+    groups = [[f"drawn-{number:02d}" for number in range(k, drawn, every)] for k in range(every)]
+    return [name for row in zip_longest(BUNDLED, *groups) for name in row if name is not None]
+
+
+@cache
+def drawn_ships(seed: int, drawn: int) -> tuple[DrawnShip, ...]:
+    """The drawn ships of a study."""
+    return tuple(draw_ship(seed, number) for number in range(drawn))
+
+
+def studied_ship(name: str, seed: int, drawn: int) -> StudiedShip:
+    """A ship of the study by its name."""
+    if name not in BUNDLED:
+        ship = drawn_ships(seed, drawn)[int(name.rpartition("-")[2])]
+        vessel = ship.vessel()
+        return StudiedShip(name, ship.type, vessel, vessel, ship.particulars)
+    truth, sea = IN_WAVES.get(name, (name, None))
+    vessel = load_vessel(name)
+    return StudiedShip(name, BUNDLED[name], load_vessel(truth), vessel, _known_particulars(vessel), sea=sea)
+
+
+def _known_particulars(vessel: Vessel) -> Particulars | None:
+    """Particulars of a bundled vessel as its document gives them; None where beam or draught are missing."""
+    known, controls = vessel.document["particulars"], Controls(vessel)
+    if not {"L_pp", "B", "T"} <= set(known):
+        return None
+    L, B, T, U = *(float(known[name]) for name in ("L_pp", "B", "T")), vessel_service_speed(vessel)
+    block = known.get("C_b") or vessel.parameters["inertia.m"] / (vessel.document["constants"]["rho"] * L * B * T)
+    signals = {name.rpartition(".")[2] for name in controls.commands}
+    propulsor = "azimuth" if "alpha" in signals else "propeller-rudder" if "delta" in signals else "differential"
+    n = balanced_shaft(controls, U)
+    rpm = None if n is None else 60 * n
+    return Particulars(L, B, T, block, U, propulsor, rpm=rpm, shafts=len(controls.drives))
+
+
+def particulars_distance(one: Particulars, other: Particulars) -> float:
+    """Distance of two ships over ln L, L / B, B / T, C_b and Froude number, each in units of its usual spread."""
+    numbers = [
+        (math.log(p.length) / 1.5, p.length / p.beam / 1.2, p.beam / p.draught / 0.6, p.block / 0.1,
+         p.service / math.sqrt(GRAVITY * p.length) / 0.05)
+        for p in (one, other)
+    ]  # fmt: skip
+    return math.dist(*numbers)
+
+
+def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
+    """The nearest drawn ship with the same drive, scaled to the length of a ship; None where there is none."""
+    mine = ship.particulars
+    if mine is None or mine.rpm is None:
+        return None
+    kind = mine.propulsor, mine.units
+    others = [one for one in drawn_ships(seed, drawn) if one.name != ship.name]
+    near = [one for one in others if (one.particulars.propulsor, one.particulars.units) == kind]
+    near.sort(key=lambda one: particulars_distance(mine, one.particulars))
+    return near[0].vessel(like=mine) if near else None
+
+
+def _template_of(ship: StudiedShip) -> Vessel | None:
+    """What `vessel new` gives from the particulars; None where its formulae do not hold."""
+    if ship.particulars is None:
+        return None
+    for given in (ship.particulars, replace(ship.particulars, rpm=None)):
+        try:
+            return first_guess(given, "template", "template.toml").vessel
+        except ShipidError:
+            continue
+    return None
+
+
+def _families(
+    ship: StudiedShip, drafted: list[dict[str, Any]], others: Iterable[str], seed: int
+) -> list[dict[str, Any]]:
+    """Families of a ship: those of `study new`, one kind of number wrong, a part missing, and vessels of others."""
+    paths = list(ship.physics.parameters)
+    hull = [path for path in paths if path.startswith("hull.")]
+    nominal, moderate, high = drafted
+    last = {path: path.rpartition(".")[2] for path in paths}
+    drives = [path for path in paths if path.startswith("thruster.") and (last[path] in DRIVING or ".K_T." in path)]
+    steers = [
+        path for path in paths if last[path] in STEERING or (path.startswith("thruster.") and "delta" in last[path])
+    ]
+    steers = [path for path in steers if ".actuator." not in path]
+    thrust = [
+        {"parameters": group, "factor": ends, "together": True}
+        for group, ends in ((drives, [0.4, 1.6]), (steers, [0.6, 1.4]))
+        if group
+    ]
+    curved = [path for path in hull if (derivative_order(path) or 0) >= 3 or last[path] == CROSS_FLOW]
+    curved = curved or [path for path in hull if (derivative_order(path) or 0) == 2 and path.split(".")[-1][0] in "YN"]
+    coupled = [path for path in hull if last[path] in COUPLING]
+    base = {"base": "physics"}
+    families = [
+        nominal,
+        moderate | {"members": 2},
+        high,
+        base | {"name": "damping", "members": 2, "perturb": moderate["perturb"]},
+        base | {"name": "mass", "members": 2, "perturb": high["perturb"]},
+        base | {"name": "thrust", "members": 2, "perturb": thrust},
+        *(
+            base | {"name": f"missing-{words}", "perturb": [{"remove": gone}]}
+            for words, gone in (("curved", curved), ("coupling", coupled))
+            if gone
+        ),
+        *({"name": name, "base": name} for name in others),
+    ]
+    return [one | {"seed": seed + place} for place, one in enumerate(families) if one.get("perturb") != []]
+
+
+def plan_ship(ship: StudiedShip, seed: int, drawn: int, amounts: Iterable[int] = AMOUNTS) -> Plan:
+    """The study of a ship: that of `study new`, with other families, manoeuvres, weather and sensors."""
+    out, dice = Path(f"{ship.name}-study.toml"), Dice((seed, "study", ship.name))
+    draft = draft_simulated({"physics": ship.physics}, out, max(HORIZONS), STEPS)
+    document: dict[str, Any] = tomllib.loads(draft.text)
+    found = {"truth": ship.truth, "physics": ship.physics, "template": _template_of(ship)}
+    vessels = {
+        name: one for name, one in (found | {"sister": _sister_of(ship, seed, drawn)}).items() if one is not None
+    }
+    amounts = sorted(amounts)
+    truth, prediction = document["truth"], document["prediction"]
+    turning = truth["manoeuvre"][0]
+    passing = ship.physics.length / vessel_service_speed(ship.physics)  # type: ignore[operator]
+    shafts = next(values for key, values in turning.items() if "n_rpm" in key and isinstance(values, list))
+    kinds = [
+        turning | {"share": dice("turning", 0.3, 1.0)},
+        turning | {"kind": "steps", "hold": [passing, 5 * passing], "share": dice("steps", 0.5, 1.5)},
+    ]
+    if not Controls(ship.truth).differential:
+        sides, angles = ["starboard", "port"], [10.0, 25.0]
+        zigzag = {"kind": ZIGZAG, "n_rpm": shafts, "angle_deg": angles, "side": sides}
+        kinds.append(zigzag | {"share": dice("zigzag", 0.2, 0.8)})
+    truth |= {
+        "vessel": "truth",
+        "manoeuvres": amounts[-1] + TESTS,
+        "seed": int(dice("seed", 0, 1e6)),
+        "manoeuvre": kinds,
+    }
+    if ship.sea:
+        truth["waves"] = dict(ship.sea)
+    for name, most in (("current_speed", 1.0), ("wind_speed", 1.6)):
+        if name in truth:
+            truth[name] = [0.0, truth[name][1] * dice(name, 0.1, most)]
+    noise = dice.scatter("noise", 1.5)
+    truth["sensors"] = {name: {"noise": noise * one["noise"]} for name, one in truth["sensors"].items()}
+    step = prediction["step"]
+    steps = round(prediction["ahead"] / step)
+    interval = step * math.ceil(PARTED * (steps + truth.get("run_up", 0.0) / step) / (SAMPLES - 1))
+    prediction |= {"commands": "known", "interval": interval, "samples": SAMPLES}
+    truth["duration"] = prediction["ahead"] + SAMPLES * interval
+    document |= {"split": {"test": TESTS, "folds": 1}, "grid": {"N_D": list(amounts), "seeds": [0]}}
+    others = [name for name in vessels if name not in ("truth", "physics")]
+    document["family"] = _families(ship, document["family"], others, truth["seed"])
+    del document["claims"]
+    return build_plan(document, out, vessels)
+
+
+def prepare_ship(plan: Plan) -> tuple[Plan, PreparedStudy]:
+    """Runs and physics of a ship, without the families of fixed numbers that diverge; DivergenceError for its own.
+
+    There are zigzags where the ship reaches a straight course, by itself or with a helmsman.
+    """
+    for approach in ("steady", "helmsman", None):
+        kinds = [
+            one | {"approach": approach} if one["kind"] == ZIGZAG else one
+            for one in plan.document["truth"]["manoeuvre"]
+        ]
+        kinds = [one for one in kinds if one["kind"] != ZIGZAG or approach]
+        document = {**plan.document, "truth": {**plan.document["truth"], "manoeuvre": kinds}}
+        plan = build_plan(document, Path(plan.file), plan.vessels)
+        try:
+            data = obtain_runs(plan)
+            break
+        except ShipidError:
+            if approach is None:
+                raise
+    while True:
+        try:
+            return plan, prepare(plan, data)
+        except DivergenceError as error:
+            lost = (error.path or "").removeprefix("family.")
+            families = [one for one in plan.document["family"] if one["name"] != lost]
+            if lost in ("", "nominal") or len(families) == len(plan.document["family"]):
+                raise
+            plan = build_plan({**plan.document, "family": families}, Path(plan.file), plan.vessels)
+
+
+def study_ship(name: str, seed: int = 0, drawn: int = DRAWN, amounts: Iterable[int] = AMOUNTS) -> pd.DataFrame:
+    """Cells of a ship, see `CELL_COLUMNS`; ShipidError where it cannot be studied."""
+    ship = studied_ship(name, seed, drawn)
+    plan, prepared = prepare_ship(plan_ship(ship, seed, drawn, amounts))
+    test, speed, length = prepared.test, vessel_service_speed(ship.physics), float(ship.physics.length or 0)
+    alone = {one: position_error(paths, test.future) for one, paths in prepared.test_paths.items()}
+    results = [(one, 0, error) for one, error in alone.items() if one != NO_MODEL]
+    results += [
+        (str(cell.row["foundation"]), unit.batch.N_D, position_error(cell.paths, test.future))
+        for unit in plan.units
+        for cell in run_unit(plan, prepared, unit, "cpu")
+        if cell.paths is not None
+    ]
+    kinds = {one.name: one.family.partition("-")[0] for one in prepared.foundations}
+    rows = [
+        {
+            "ship": name, "type": ship.type, "bundled": name in BUNDLED, "length": length, "speed": speed,
+            "froude": speed / math.sqrt(GRAVITY * length), "foundation": foundation, "kind": kinds[foundation],
+            "A": math.nan if foundation == NO_MODEL else float(alone[foundation][:end].mean()), "N_D": N_D,
+            "ahead": ahead, "H": float(error[:end].mean()), "baseline": float(prepared.naive[:end].mean()),
+            "floor": float(alone["nominal"][:end].mean()),
+        }
+        for foundation, N_D, error in results
+        for ahead, end in ((ahead, round(test.horizon * ahead / max(HORIZONS))) for ahead in HORIZONS)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _try_ship(seed: int, drawn: int, amounts: tuple[int, ...], name: str) -> pd.DataFrame | str:
+    """Cells of a ship, or why it has none."""
+    try:
+        return study_ship(name, seed, drawn, amounts)
+    except ShipidError as error:
+        return str(error)
+
+
+def run_ships(
+    folder: Path,
+    seed: int = 0,
+    drawn: int = DRAWN,
+    amounts: tuple[int, ...] = AMOUNTS,
+    *,
+    workers: int = 0,
+    shard: tuple[int, int] = (1, 1),
+) -> Iterator[str]:
+    """Study the ships that are not finished in a folder, or every n-th of them from the i-th on; a line for each.
+
+    Each ship has its file, so that shards may share the folder; after each, `cells.parquet` and `cells.csv` are anew.
+
+    Raises ResultError for a folder of another study.
+    """
+    first, every = check_shard(shard)
+    make_folder(folder)
+    settings = {"seed": seed, "drawn": drawn, "amounts": list(amounts)}
+    place = folder / "ships.json"
+    if place.exists() and (known := read_json(place)) != settings:
+        raise ResultError(f"holds the study over ships with {known}, not {settings}: take another folder", file=place)
+    write_json(place, settings)
+    names = ship_names(drawn)[first - 1 :: every]
+    left = [name for name in names if not (folder / f"{name}.parquet").exists()]
+    for name, cells in on_workers(partial(_try_ship, seed, drawn, amounts), left, workers):
+        if isinstance(cells, str):
+            yield f"{name} is left out: {cells}"
+            continue
+        with replace_whole(folder / f"{name}.parquet") as file:
+            cells.to_parquet(file)
+        files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").exists()]
+        table = pd.concat(map(pd.read_parquet, files), ignore_index=True)
+        with replace_whole(folder / "cells.parquet") as file:
+            table.to_parquet(file)
+        with replace_whole(folder / "cells.csv") as file:
+            table.to_csv(file, index=False)
+        yield f"{name}: {len(cells)} cells; {len(files)} of {len(BUNDLED) + drawn} ships"
