@@ -34,7 +34,7 @@ SMALLEST_REST = 1e-6  # of H, in the weights of the members
 MOST_FOLDS = 40  # parts of the members that are left out in turn
 LEAST_SHARE = 0.01  # of H, that is worth finding
 MOST_WINDOWS = 1000  # test windows, at even distances, whose errors are compared
-SHARE_COLUMNS = ["family", "N_D", "members", "needed", "H", "number", "kind", "share", "low", "high", "gain"]
+SHARE_COLUMNS = ["family", "N_D", "members", "needed", "H", "number", "kind", "share", "low", "high"]
 
 
 def estimate_parts(scores: Array, products: Array) -> Array:
@@ -81,8 +81,11 @@ def shares_frame(results: Results) -> pd.DataFrame:
 
     Columns: family, N_D (0: the physics alone), members, needed (how many might tell at least one number), H [m],
     number (paths that are drawn together are one), kind (`number`; `block`: all numbers of one; `rest`; `common`: what
-    all members share; empty where members are too few for any), share [1] with low, high (95 %), gain [m]: about how
-    much less H would be were the number right. Of the method that the study judges by; seeds together.
+    all members share; empty where members are too few for any), share [1] with low, high (95 %). Of the method that the
+    study judges by; seeds together.
+
+    A share is that of the number's own error, on average over the others. What H of one ship falls by were the number
+    right may be more or less: errors of numbers offset each other.
     """
     rows: list[tuple[Any, ...]] = []
     for family, models in results.models.groupby("family", sort=False):
@@ -100,9 +103,9 @@ def _member_errors(results: Results, models: Sequence[str], N_D: int) -> dict[st
     """Model -> g [m^1/2] over windows and draws of runs; what lacks a draw or a finite path is left out."""
     cells, true = results.judged_cells, results.test.future
     mine = cells[cells["N_D"].eq(N_D) & cells["status"].eq("ok")].groupby("model")["cell"]
+    alone = {model: [results.physics[model]] for model in models if model in results.physics}
     found = {str(model): [results.paths[cell] for cell in drawn] for model, drawn in mine if model in models}
-    if N_D == 0:
-        found = {model: [results.physics[model]] for model in models if model in results.physics}
+    found = found if N_D else alone
     draws, windows = max(map(len, found.values()), default=0), even_places(true.shape[1], MOST_WINDOWS)
     result = {}
     for model, paths in found.items():
@@ -120,7 +123,7 @@ def _family_rows(factors: pd.DataFrame, errors: Array) -> list[tuple[Any, ...]]:
     numbers, members = drawn.shape
     H = float(np.trace(products)) / members
     if members * (members - 1) < 4 * (numbers + 1):  # half the pairs against the parts
-        return [(members, 2 * (numbers + 1), H, "", "", *[np.nan] * 4)]
+        return [(members, 2 * (numbers + 1), H, "cannot be told", "", *[np.nan] * 3)]
     blocks = pd.Series([name.partition(".")[0] for name in names])
     several = blocks.value_counts(sort=False).loc[lambda counts: counts > 1].index
     each = np.eye(numbers + 2)
@@ -131,5 +134,4 @@ def _family_rows(factors: pd.DataFrame, errors: Array) -> list[tuple[Any, ...]]:
     needed = int(np.ceil(members * max(1.0, width.min()) ** 2))
     kinds = ["number"] * numbers + ["block"] * len(several) + ["rest", "common"]
     names += [*several, "the rest", "what all members share"]
-    gain = H * (1 - np.sqrt(np.maximum(1 - share, 0)))
-    return [(members, needed, H, *row) for row in zip(names, kinds, share, low, high, gain, strict=True)]
+    return [(members, needed, H, *row) for row in zip(names, kinds, share, low, high, strict=True)]

@@ -82,15 +82,13 @@ def members(tiny_run: Path) -> Results:
 
 def test_the_physics_alone_is_shared_out(members: Results) -> None:
     frame = shares_frame(members)
-    assert set(frame["family"]) == {"m"} and set(frame["N_D"]) == {0}, "one member tells nothing, nor one without cells"
+    assert set(zip(frame["family"], frame["N_D"], strict=True)) == {("m", 0)}, "one member alone tells nothing"
     share = frame.set_index("number")["share"]
     assert list(share.index) == ["hull.a", "hull.b, thruster.b", "hull", "the rest", "what all members share"]
     assert share["hull.a"] > 0.7 > 0.1 > share["hull.b, thruster.b"]
     assert share.drop("hull").sum() == pytest.approx(1.0)
     errors = [np.linalg.norm(members.physics[f"m-{k}"] - members.test.future, axis=2).mean() for k in range(16)]
     np.testing.assert_allclose(frame["H"], np.mean(errors))
-    gain = frame.set_index("number")["gain"]["hull.a"]
-    assert 0.4 * frame["H"][0] < gain < frame["H"][0]
 
 
 def test_too_few_members_say_how_many_would_do(members: Results) -> None:
