@@ -20,15 +20,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from shipid.evidence import SIGNIFICANT, SMALLEST_ERROR
+from shipid.evidence import ROUNDING, SIGNIFICANT, SMALLEST_ERROR
 from shipid.metrics import vector_lengths
 from shipid.report.figure import even_places
 from shipid.study.results import Results
 
-Array = NDArray[np.float64]
+Array = np.ndarray
 ROUNDS = 8  # of Fisher scoring: half as many reach the same digits
 SMALLEST_REST = 1e-6  # of H, in the weights of the members
 MOST_FOLDS = 40  # parts of the members that are left out in turn
@@ -53,7 +52,7 @@ def estimate_parts(scores: Array, products: Array) -> Array:
         beside, alone = np.square(basis).sum(axis=0), np.square(weights).sum()
         information = np.block([[np.square(scores.T @ basis), beside[:, None]], [beside[None], alone[None, None]]])
         measured = np.append(np.sum(basis * (products @ basis), axis=0), np.sum(weights @ weights * products))
-        size = np.sqrt(np.diag(information))
+        size = np.sqrt(np.diag(information) + ROUNDING**2 * information.max())  # 0 of a number that no member changes
         parts = np.linalg.lstsq(information / np.outer(size, size), measured / size, rcond=None)[0] / size
     return np.asarray(parts)
 
@@ -94,7 +93,7 @@ def shares_frame(results: Results) -> pd.DataFrame:
             errors = _member_errors(results, [model for model in known if isinstance(known[model], Mapping)], N_D)
             factors = pd.DataFrame({model: known[model] for model in errors}, dtype=float).fillna(1.0)
             factors = factors[factors.nunique(axis=1) > 1]
-            if len(factors):
+            if len(factors) and np.any([*errors.values()]):  # exact physics has no error to share out
                 rows += [(family, N_D, *row) for row in _family_rows(factors, np.array([*errors.values()]))]
     return pd.DataFrame(rows, columns=SHARE_COLUMNS)
 

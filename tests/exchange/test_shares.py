@@ -65,6 +65,15 @@ def test_members_that_differ_by_chance_tell_nothing() -> None:
     assert found <= 4  # of 40; 5 % would be 2
 
 
+def test_a_number_that_one_member_alone_changes_makes_no_trouble() -> None:
+    """Where that member is left out, nobody changes it."""
+    scores, products, _ = linear_world(4, 20, 4, 0.2)
+    scores[:, 3] = np.arange(20) == 7
+    share, low, high = share_intervals(scores, products, np.eye(4, 6))
+    assert np.isfinite([share, low, high]).all()
+    assert low[3] <= 0 <= high[3]
+
+
 @pytest.fixture(scope="module")
 def members(tiny_run: Path) -> Results:
     """A tiny study whose family has 16 members by three numbers, two of them drawn together."""
@@ -91,11 +100,34 @@ def test_the_physics_alone_is_shared_out(members: Results) -> None:
     np.testing.assert_allclose(frame["H"], np.mean(errors))
 
 
+def test_cells_with_data_are_shared_out_over_draws(members: Results) -> None:
+    """Two draws of the runs: shares are those of the mean product; a model that lacks a draw is left out."""
+    cells = [
+        {"cell": f"{model}/{seed}", "foundation": model, "method": members.cells["method"].iloc[0], "N_D": 2}
+        | {"seed": seed, "status": "ok"}
+        for model in members.models["model"].head(16)
+        for seed in (0, 1)
+    ][:-1]
+    true = members.test.future
+    paths = {one["cell"]: true + (members.physics[one["foundation"]] - true) / (2 + 2 * one["seed"]) for one in cells}
+    with_data = shares_frame(replace(members, cells=pd.DataFrame(cells), paths=paths))
+    alone = shares_frame(replace(members, models=members.models[members.models["model"].ne("m-15")]))
+    mine = with_data[with_data["N_D"].eq(2)]
+    assert set(mine["members"]) == {15}
+    np.testing.assert_allclose(mine["share"], alone["share"], atol=1e-6)
+    np.testing.assert_allclose(mine["H"], alone["H"] * (1 / 2 + 1 / 4) / 2)
+
+
 def test_too_few_members_say_how_many_would_do(members: Results) -> None:
     few = replace(members, models=members.models[members.models["model"].isin(["m-0", "m-1", "m-2"])])
     (row,) = shares_frame(few).to_dict("records")
     assert (row["members"], row["needed"], row["kind"]) == (3, 6, "")
     assert np.isnan(row["share"])
+
+
+def test_exact_physics_has_no_share(members: Results) -> None:
+    exact = dict.fromkeys(members.physics, members.test.future)
+    assert shares_frame(replace(members, physics=exact)).empty
 
 
 def test_a_member_that_diverges_is_left_out(members: Results) -> None:
