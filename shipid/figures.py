@@ -69,6 +69,7 @@ __all__ = [
     "profiles",
     "residuals",
     "search",
+    "shares",
     "spiral",
     "spread",
     "track",
@@ -154,6 +155,11 @@ def factors(source: Source | VesselFamily, *, dark: bool = False) -> go.Figure:
             )
         return draw_alone(family_figure(pd.DataFrame(source.table().xs("factor", axis=1, level=1))), dark=dark)
     return _draw("factors", content_of(source), dark=dark)
+
+
+def shares(source: Source, family: str | None = None, *, dark: bool = False) -> go.Figure:
+    """Share of H that the error of each number makes, with intervals, at each N_D; `family` default: the first."""
+    return _draw("shares", content_of(source), [family], dark=dark, lack="no family has enough members")
 
 
 def spread(source: Trajectories, *, dark: bool = False) -> go.Figure:

@@ -20,11 +20,12 @@ from shipid.simulation.families import VesselFamily, read_family
 from shipid.study.results import read_results
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family
-from tests.report import test_checks, test_identification, test_motion
+from tests.report import test_checks, test_identification, test_motion, test_shares
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
     **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
+    "shares": test_shares.content,
     "motion": lambda: test_checks.content("log"),
     "spread": lambda: read_family("quick", "moderate").trajectories("zigzag", 20),
 }

@@ -14,6 +14,7 @@ from shipid.answer import bands, frames, methods, sentences
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
 from shipid.errors import ResultError
+from shipid.exchange.shares import shares_frame
 from shipid.files import read_json, write_table, write_text
 from shipid.metrics import summarise_errors
 from shipid.report import AnswerSentence, ReportContent, summary_text, write_report
@@ -27,13 +28,14 @@ from shipid.study.results import Results, read_results
 
 Say = Callable[[str], object]
 REPAIR_COLUMNS = ["kind", "column", "count", "note"]
-ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
+ANSWER, SUMMARY, REPORT, METHODS, SHARES = "answer.txt", "summary.md", "report.html", "methods.csv", "shares.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
     "regression": frames.regression_frame,
     "coverage": bands.coverage_frame,
     "no_band": bands.refused_frame,
     "methods": methods.compare_methods,
+    "shares": shares_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
@@ -98,6 +100,7 @@ def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
     content = report_content(results)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_text(folder / SUMMARY, summary_text(content))
+    write_table(folder / SHARES, content.frame("shares"))
     return write_report(content, folder / REPORT)
 
 

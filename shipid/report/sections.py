@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shipid.report import bands, errors_over, factors, logs, methods, paths, physics_and_data, search
+from shipid.report import bands, errors_over, factors, logs, methods, paths, physics_and_data, search, shares
 from shipid.report.content import ReportContent
 from shipid.report.page import HEAD, Section, write_page
 
@@ -15,6 +15,7 @@ SECTIONS: dict[str, Section] = {
     "how-far-off": bands.HOW_FAR_OFF,
     "the-methods": methods.THE_METHODS,
     "predictions": paths.PREDICTIONS,
+    "to-measure": shares.WHAT_TO_MEASURE,
     "the-models": factors.THE_MODELS,
     "data": logs.THE_DATA,
     "the-search": search.THE_SEARCH,
