@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -20,6 +20,7 @@ from shipid.observer import Observer, filter_bank
 from shipid.study.schema import PAIRED_ROLES, MeanBlock, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, change_structure, draw_members, resolve_families
+from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
 
 NO_MODEL = "none"
 NO_METHOD = "alone"  # of the rows of A in comparisons of runs, whose N_D is 0: no data improve it
@@ -106,12 +107,28 @@ def bases_of(
     simulators : those that are known, by `key`, to which those that are read now are added.
     """
     if family.base is not None:
-        return [change_structure(family, named_vessel(family.base, file, f"{path}.base", known))]
+        vessel = change_structure(family, named_vessel(family.base, file, f"{path}.base", known))
+        return [*_similar_bases(family, vessel, file, f"{path}.similar", known)] if family.similar else [vessel]
     kind, value = next((kind, value) for kind in SIMULATORS if (value := getattr(family, kind)) is not None)
     found = named_simulators(kind, value, file, f"{path}.{kind}", simulators, trust)
     if family.structure or (family.perturb and kind == "predictions"):
         raise DocumentError(f"{kind} has no structure, and a table no numbers: leave it out", path=f"{path}.{kind}")
     return [*found]
+
+
+def _similar_bases(family: Family, own: Vessel, file: Path, path: str, known: dict[str, Vessel]) -> Iterator[Vessel]:
+    """The ships most like a family's base, scaled: known ones, or found now and known from now on."""
+    count = family.similar or 0
+    names = [f"{own.key} {own.digest}: similar {place} of {count}, {family.ships}" for place in range(count)]
+    if any(name not in known for name in names):
+        try:
+            places = [] if family.ships is None else [file.parent / family.ships, Path(family.ships)]
+            ships = read_ships(next((place for place in places if place.is_dir()), places[-1] if places else None))
+            found = similar_vessels(vessel_particulars(own), ships, count, own)
+        except ShipidError as error:
+            raise DocumentError(f"{error.file}: {error.message}" if error.file else error.message, path=path) from None
+        known |= {name: one.vessel for name, one in zip(names, found, strict=True)}
+    return (known[name] for name in names)
 
 
 def named_simulators(
@@ -138,16 +155,11 @@ def foundations_of(
         if family.name.lower() == NO_MODEL:
             raise DocumentError("this name is taken by the foundation without physics", path=f"family.{index}.name")
         bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
-        vessel = bases[0] if isinstance(bases[0], Vessel) else None
         parent = families[_root(study.family, index)]
-        for block in ("identify", "observer") if vessel is None else ():
+        for block in () if isinstance(bases[0], Vessel) else ("identify", "observer"):
             if getattr(family, block) is not None:
                 words = "it needs the equations of a vessel, and this family has none: take a family with a base"
                 raise DocumentError(words, path=f"family.{index}.{block}")
-        identify = None if family.identify is None or vessel is None else _identify(study, family, index, vessel)
-        observer = None if family.observer is None or vessel is None else _observer(study, family, index, vessel)
-        ways = (parent.description, IDENTIFIED if identify else "", OBSERVED if observer else "")
-        words = family.description or ", ".join(filter(None, ways))
         if len(bases) > 1:
             parent = parent.model_copy(update={"members": len(bases)})
         drawn = [
@@ -159,6 +171,13 @@ def foundations_of(
             name = variant.name
             if parent is not family:
                 name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
+            identify = observer = None
+            if isinstance(base, Vessel):
+                identify = None if family.identify is None else _identify(study, family, index, base)
+                observer = None if family.observer is None else _observer(study, family, index, base)
+            of = base.name if isinstance(base, Vessel) and family.similar else parent.description
+            ways = (of, IDENTIFIED if identify else "", OBSERVED if observer else "")
+            words = family.description or ", ".join(filter(None, ways))
             foundations.append(Foundation(name, family.name, variant.member, variant, base, words, identify, observer))
     foundations += [
         _mean_of_foundations(block, f"model.{place}", foundations) for place, block in enumerate(study.model)

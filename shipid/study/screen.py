@@ -38,7 +38,11 @@ ROW_COLUMNS = ("family", "member", "A", "A_90", "diverged")
 
 def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of vessels, or all that draw factors from a range; DocumentError if nothing is drawn."""
-    drawn = [one for one in plan.families if one.base is not None and any(block.drawn for block in one.perturb)]
+    drawn = [
+        one
+        for one in plan.families
+        if one.base is not None and not one.similar and any(block.drawn for block in one.perturb)
+    ]
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
         which = "no family draws a" if name is None else f"{name!r} draws no"
