@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any, get_args
 
@@ -121,13 +122,17 @@ def _similar_bases(family: Family, own: Vessel, file: Path, path: str, known: di
     count = family.similar or 0
     names = [f"{own.key} {own.digest}: similar {place} of {count}, {family.ships}" for place in range(count)]
     if any(name not in known for name in names):
+        places = [] if family.ships is None else [file.parent / family.ships, Path(family.ships)]
         try:
-            places = [] if family.ships is None else [file.parent / family.ships, Path(family.ships)]
             ships = read_ships(next((place for place in places if place.is_dir()), places[-1] if places else None))
-            found = similar_vessels(vessel_particulars(own), ships, count, own)
+            if own.length is None:
+                raise ShipidError("the base gives no particulars.L_pp, to which ships are scaled")
+            found = [*islice(similar_vessels(vessel_particulars(own), ships, own), count)]
+            if len(found) < count:
+                raise ShipidError(f"{len(found)} ships can be scaled: ask for fewer, or name a folder `ships`")
         except ShipidError as error:
             raise DocumentError(f"{error.file}: {error.message}" if error.file else error.message, path=path) from None
-        known |= {name: one.vessel for name, one in zip(names, found, strict=True)}
+        known |= {name: vessel for name, (_, vessel) in zip(names, found, strict=True)}
     return (known[name] for name in names)
 
 

@@ -10,11 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import tomlkit
 
 from shipid import document as documents
 from shipid.document import Document
@@ -40,29 +37,11 @@ TAYLOR = 2.6
 """Wetted surface over sqrt(volume x length), Taylor (1910)."""
 SPREADS = {"L/B": 0.3, "B/T": 0.3, "C_b": 0.12, "Fn": 0.08, "L": 2.0}
 """What counts as one unit of distance: of C_b and the Froude number as they are, of the others in the logarithm."""
-ALIKE = 0.05  # ratios within which two vessels count as one ship, such as a ship and the same with more freedom
-SCREW = ("D_p", "T_nn", "T_nu", "dT_nu", "T_uu", "c_un", "c_nn")  # numbers that go with the size of a screw
+ALIKE = 0.05  # differences of features up to which two vessels count as one ship
+SCREW = ("D_p", "T_nn", "T_nu", "dT_nu", "T_uu", "c_un", "c_nn", "n_0")  # numbers that go with the size of a screw
 SCREW_SIZES = (0.5, 2.0)  # least and greatest change of a screw's size
+TUNNEL = "thruster.tunnel"
 ABOUT_SERVICE = "thruster.service_speed"  # thrust less resistance in one polynomial: neither is there alone
-
-
-@dataclass(frozen=True)
-class SimilarVessel:
-    """A scaled ship.
-
-    vessel : as it is after scaling. source : key of the ship that it was. ratio : length after over length before.
-    distance : see `particulars_distance`. notes : what was corrected or replaced, one sentence each.
-    """
-
-    vessel: Vessel
-    source: str
-    ratio: float
-    distance: float
-    notes: tuple[str, ...]
-
-    def text(self) -> str:
-        """The scaled vessel as TOML, which `load_vessel` reads."""
-        return tomlkit.dumps(self.vessel.document)
 
 
 def scale_vessel(vessel: Vessel, ratio: float, rho: float | None = None) -> Vessel:
@@ -72,16 +51,12 @@ def scale_vessel(vessel: Vessel, ratio: float, rho: float | None = None) -> Vess
     paths are predicted without waves.
     """
     document = _acting_document(vessel.document)
-    constants = document.get("constants", {})
-    water = rho / constants["rho"] if rho is not None and "rho" in constants else 1.0
+    water = 1.0 if rho is None else rho / document.get("constants", {}).get("rho", rho)
     sizes = {"m": ratio, "s": math.sqrt(ratio), "kg": ratio**3 * water}
     units = {f"particulars.{key}": PARTICULARS[key] for key in document.get("particulars", {}) if key in PARTICULARS}
     units |= {path: unit for path, unit in parameter_units(document).items() if not path.startswith("constants.")}
-    values: dict[str, Any] = {
-        path: documents.value_at_path(document, path) * unit_value(unit, sizes) for path, unit in units.items()
-    }
-    if water != 1.0:
-        values["constants.rho"] = rho
+    values = {path: documents.value_at_path(document, path) * unit_value(unit, sizes) for path, unit in units.items()}
+    values |= {} if rho is None else {"constants.rho": rho}
     return check_document(documents.replace_values(document, values), vessel.file)
 
 
@@ -108,25 +83,20 @@ def vessel_particulars(vessel: Vessel) -> dict[str, float]:
 
 def _shape_features(known: Mapping[str, float]) -> dict[str, float]:
     """The features that `SPREADS` names, as far as they are known."""
-    L, B, T, U = (known.get(key) for key in ("L_pp", "B", "T", "U_0"))
-    found = {
-        "L/B": math.log(L / B) if L and B else None,
-        "B/T": math.log(B / T) if B and T else None,
-        "C_b": known.get("C_b"),
-        "Fn": U / math.sqrt(GRAVITY * L) if U and L else None,
-        "L": math.log(L) if L else None,
-    }
-    return {name: value for name, value in found.items() if value is not None}
+    L, B, T, U = (known.get(key, math.nan) for key in ("L_pp", "B", "T", "U_0"))
+    found = {"L/B": math.log(L / B), "B/T": math.log(B / T), "C_b": known.get("C_b", math.nan)}
+    found |= {"Fn": U / math.sqrt(GRAVITY * L), "L": math.log(L)}
+    return {name: value for name, value in found.items() if not math.isnan(value)}
 
 
 def particulars_distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
     """Distance [-] of two ships by their particulars: the root mean square of differences over `SPREADS`.
 
-    A feature that is known of one ship alone counts 1; one that is known of neither is left out.
+    A feature that is known of one ship alone counts as of any two ships, 2 in the square; of neither: it is left out.
     """
     a, b = _shape_features(one), _shape_features(other)
     squares = [
-        ((a[name] - b[name]) / spread) ** 2 if name in a and name in b else 1.0
+        ((a[name] - b[name]) / spread) ** 2 if name in a and name in b else 2.0
         for name, spread in SPREADS.items()
         if name in a or name in b
     ]
@@ -135,128 +105,104 @@ def particulars_distance(one: Mapping[str, float], other: Mapping[str, float]) -
 
 def read_ships(folder: Path | None = None) -> list[Vessel]:
     """Every bundled vessel, and every vessel in the TOML files of a folder; DocumentError where there is none in it."""
-    files = [*documents.bundled_documents("models").values()]
-    if folder is not None:
-        own = [file for file in sorted(folder.glob("*.toml")) if _is_vessel(documents.read_document(file))]
-        if not own:
-            raise DocumentError("no vessel in the TOML files of this folder", file=folder)
-        files += own
-    return [load_vessel(file) for file in files]
+    bundled = [*documents.bundled_documents("models").values()]
+    files = [] if folder is None else sorted(folder.glob("*.toml"))
+    own = [
+        file for file in files if not documents.read_document(file).keys().isdisjoint(("inertia", "base", "extends"))
+    ]
+    if folder is not None and not own:
+        raise DocumentError("no vessel in the TOML files of this folder", file=folder)
+    return [load_vessel(file) for file in (*bundled, *own)]
 
 
-def _is_vessel(document: Document) -> bool:
-    return not document.keys().isdisjoint({"inertia", "base", "extends"})
-
-
-def nearest_ships(known: Mapping[str, float], ships: Iterable[Vessel]) -> Iterator[tuple[float, Vessel]]:
+def nearest_ships(known: Mapping[str, float], ships: Iterable[Vessel]) -> list[tuple[float, Vessel]]:
     """Distance and vessel of each ship, the nearest first, one vessel of each ship: that with the fewest freedoms.
 
     known : as of `vessel_particulars`. Vessels without a length are left out.
     """
     rows: list[tuple[float, Vessel]] = []
     for vessel in sorted(ships, key=lambda ship: (len(ship.axes), ship.key, ship.digest)):
-        features = {name: value for name, value in _shape_features(vessel_particulars(vessel)).items() if name != "Fn"}
-        if "L" in features and not any(_is_same_ship(features, other) for _, other in rows):
+        if vessel.length is not None and not any(_is_same_ship(vessel, other) for _, other in rows):
             rows.append((particulars_distance(known, vessel_particulars(vessel)), vessel))
-    yield from sorted(rows, key=lambda row: (row[0], row[1].key))
+    return sorted(rows, key=lambda row: (row[0], row[1].key))
 
 
-def _is_same_ship(features: Mapping[str, float], vessel: Vessel) -> bool:
-    """Whether a vessel has these features, the Froude number apart, to 5 %."""
-    other = {name: value for name, value in _shape_features(vessel_particulars(vessel)).items() if name != "Fn"}
-    return features.keys() == other.keys() and all(abs(value - other[name]) < ALIKE for name, value in features.items())
+def _is_same_ship(vessel: Vessel, other: Vessel) -> bool:
+    """Whether two vessels have the same size and form to 5 %, such as a ship and the same with more freedoms."""
+    a, b = ({**_shape_features(vessel_particulars(one)), "Fn": 0.0} for one in (vessel, other))
+    return a.keys() == b.keys() and all(abs(value - b[name]) < ALIKE for name, value in a.items())
 
 
 def similar_vessels(
-    known: Mapping[str, float], ships: Iterable[Vessel], count: int, own: Vessel | None = None
-) -> list[SimilarVessel]:
-    """The nearest ships, scaled to the length of one's own, the nearest first.
+    known: Mapping[str, float], ships: Iterable[Vessel], own: Vessel | None = None
+) -> Iterator[tuple[float, Vessel]]:
+    """Distance and vessel of ships scaled to the length of one's own, the nearest first.
+
+    Their `source` says what was corrected. What cannot be scaled or driven so is left out, and so is one's own vessel.
 
     known : particulars of one's own ship, at least L_pp [m]. own : one's own vessel, whose commands the scaled ships
     take: a ship that is driven and steered in the same way keeps its screws and helms under the names of one's own,
-    of another the hull alone is taken, with screws and helms of one's own. It is no member itself.
-
-    Raises ShipidError where fewer ships can be scaled.
+    of another the hull alone is taken, with screws and helms of one's own.
     """
-    if "L_pp" not in known:
-        raise ShipidError("the length between perpendiculars is not known: give particulars.L_pp")
-    found: list[SimilarVessel] = []
     for distance, vessel in nearest_ships(known, [ship for ship in ships if own is None or ship.digest != own.digest]):
         with suppress(ShipidError):
-            found.append(_similar_vessel(known, vessel, distance, own))
-        if len(found) == count:
-            return found
-    raise ShipidError(f"{len(found)} ships can be scaled, {count} are asked for: ask for fewer, or give a folder")
+            yield distance, _similar_vessel(known, vessel, own)
 
 
-def _similar_vessel(known: Mapping[str, float], vessel: Vessel, distance: float, own: Vessel | None) -> SimilarVessel:
+def _similar_vessel(known: Mapping[str, float], vessel: Vessel, own: Vessel | None) -> Vessel:
     """One ship scaled, with its friction and screws corrected."""
-    before = vessel_particulars(vessel)
-    ratio, notes = known["L_pp"] / before["L_pp"], list[str]()
-    rho = None if own is None else own.document.get("constants", {}).get("rho")
-    scaled = scale_vessel(vessel, ratio, rho)
+    before, notes = vessel_particulars(vessel), list[str]()
+    ratio = known["L_pp"] / before["L_pp"]
+    scaled = scale_vessel(vessel, ratio, None if own is None else own.document.get("constants", {}).get("rho"))
     speed = known.get("U_0") or before.get("U_0", 0.2 * math.sqrt(GRAVITY * before["L_pp"])) * math.sqrt(ratio)
-    shaft = _shaft_or_none(own or scaled, speed)
+    shaft = service_shaft(own or scaled, speed, MOST_FORCE)
     if own is not None:
-        scaled, words = _drive_like(scaled, own)
-        notes += words
-    if not any(key == ABOUT_SERVICE for _, key, _ in term_blocks(scaled.document)):
+        scaled = _drive_like(scaled, own, notes)
+    if ABOUT_SERVICE not in _term_keys(scaled):
         change = friction_change(scaled, ratio, speed)
         resistance = scaled.parameters.get("hull.resistance.R_0", 0.0)
         scaled = scaled.with_values({"hull.resistance.R_0": resistance + change})
-        notes.append(f"friction by ITTC-57: {change * speed**2:+.3g} N at {speed:.3g} m/s")
-    if shaft is not None:
-        scaled, size = fit_screws(scaled, speed, shaft)
-        held = f"hold {speed:.3g} m/s at {60 * shaft:.4g} rpm"
-        notes.append(f"no screws {held}: they stay" if math.isnan(size) else f"screws {size:.3g} times as large {held}")
-    document = scaled.document | {
-        "name": f"{vessel.name}, {ratio:.4g} times as long",
-        "source": f"shipid vessel similar: {vessel.key} by Froude's law; {'; '.join(notes)}",
-    }
-    return SimilarVessel(Vessel(document, vessel.file), vessel.key, ratio, distance, tuple(notes))
+        notes.append(f"friction by ITTC-57, {change * speed**2:+.3g} N at {speed:.3g} m/s")
+    scaled, size = (scaled, 1.0) if shaft is None else fit_screws(scaled, speed, shaft)
+    at = "" if shaft is None else f"screws times {size:.3g}: {60 * shaft:.4g} rpm at"
+    notes.append(f"{at or 'no shaft speed holds'} {speed:.3g} m/s")
+    words = {"name": f"{vessel.name}, {ratio:.3g} times as long", "source": f"{vessel.key} scaled; {'; '.join(notes)}"}
+    return Vessel(scaled.document | words, vessel.file)
 
 
-def _shaft_or_none(vessel: Vessel, speed: float) -> float | None:
-    """Shaft speed [rev/s] that holds a speed; None where none does."""
-    with suppress(ShipidError):
-        return service_shaft(vessel, speed, MOST_FORCE)
-    return None
+def _term_keys(vessel: Vessel) -> set[str]:
+    return {key for _, key, _ in term_blocks(vessel.document)}
 
 
-def _drive_layout(vessel: Vessel) -> dict[str, tuple[bool, tuple[str, ...], float]]:
-    """Name of each thruster -> whether it is a tunnel, its commands, and the side of the ship that it is on."""
+def _drive_layout(vessel: Vessel) -> list[tuple[tuple[str, ...], bool, bool, str]]:
+    """Commands, whether it is to port, whether to starboard, and name of each thruster but tunnels, in order."""
     known = rows_of_role("command")
-    return {
-        path.partition(".")[2]: (
-            key == "thruster.tunnel",
-            tuple(signal for signal in function_signals(TERMS[key].function) if signal in known),
-            math.copysign(1.0, block["y"]) if block.get("y") else 0.0,
+    return sorted(
+        (
+            tuple(known.keys() & {*function_signals(TERMS[key].function)}),
+            block.get("y", 0) < 0,
+            block.get("y", 0) > 0,
+            path[9:],
         )
         for path, key, block in term_blocks(vessel.document)
-        if path.startswith("thruster.")
-    }
+        if path.startswith("thruster.") and key != TUNNEL
+    )
 
 
-def _drive_like(vessel: Vessel, own: Vessel) -> tuple[Vessel, list[str]]:
-    """The vessel with the commands of one's own, and what was replaced for that; see `similar_vessels`."""
-    mine, theirs, names = _drive_layout(own), _drive_layout(vessel), dict[str, str]()
-    for name, kind in theirs.items():
-        free = [other for other, one in mine.items() if one == kind and other not in names.values()]
-        names |= dict.fromkeys([name], free[0]) if free else {}
-    document = vessel.document
-    lacking = [name for name, (tunnel, *_) in theirs.items() if name not in names and not tunnel]
-    lacking += [name for name, (tunnel, *_) in mine.items() if name not in names.values() and not tunnel]
-    if not lacking:
-        blocks = {names[name]: block for name, block in document["thruster"].items() if name in names}
-        behind = {name: {BEHIND: names[block[BEHIND]]} if BEHIND in block else {} for name, block in blocks.items()}
-        thrusters: Document = {name: block | behind[name] for name, block in blocks.items()}
+def _drive_like(vessel: Vessel, own: Vessel, notes: list[str]) -> Vessel:
+    """The vessel with the commands of one's own, see `similar_vessels`; `notes` takes what was replaced."""
+    mine, theirs, thrusters = _drive_layout(own), _drive_layout(vessel), dict(own.document.get("thruster", {}))
+    if [kind for *kind, _ in mine] == [kind for *kind, _ in theirs]:
+        names = {other: name for (*_, other), (*_, name) in zip(theirs, mine, strict=True)}
+        for other, name in names.items():
+            block = vessel.document["thruster"][other]
+            thrusters[name] = block | ({BEHIND: names[block[BEHIND]]} if BEHIND in block else {})
+    elif ABOUT_SERVICE in _term_keys(vessel) | _term_keys(own):
+        raise ShipidError(f"{vessel.name}: hull and screw are one polynomial, which stays with its own drive")
     else:
-        thrusters = own.document.get("thruster", {})
-        if ABOUT_SERVICE in {key for one in (vessel, own) for _, key, _ in term_blocks(one.document)}:
-            raise ShipidError(f"{vessel.name}: hull and screw are one polynomial, which stays with its own drive")
-    particulars = own.document.get("particulars", {}) | document.get("particulars", {})
-    changed = document | {"thruster": thrusters, "particulars": particulars}
-    return check_document(changed, vessel.file), ["screws and helms are those of your own ship"] if lacking else []
+        notes.append("screws and helms are those of your own ship")
+    particulars = own.document.get("particulars", {}) | vessel.document.get("particulars", {})
+    return check_document(vessel.document | {"thruster": thrusters, "particulars": particulars}, vessel.file)
 
 
 def friction_change(vessel: Vessel, ratio: float, speed: float) -> float:
@@ -266,9 +212,8 @@ def friction_change(vessel: Vessel, ratio: float, speed: float) -> float:
     Watanabe where beam and draught are known, S of Taylor; C_A of Holtrop and Mennen for a ship, from 10 m on.
     """
     known, rho = vessel_particulars(vessel), float(vessel.document.get("constants", {}).get("rho", RHO_SEA))
-    L, shape = known["L_pp"], [known.get(key) for key in ("B", "T", "C_b")]
-    B, T, C_b = (value or 0.0 for value in shape)
-    k = form_factor(L, B, T, C_b) if all(shape) else 0.0
+    L, shape = known["L_pp"], [known[key] for key in ("B", "T", "C_b") if key in known]
+    k = form_factor(L, *shape) if len(shape) == 3 else 0.0
 
     def coefficient(length: float, fast: float) -> float:
         return (1 + k) * ittc_friction(fast, length, NU) + (correlation_allowance(length) if length >= MODEL else 0.0)
@@ -280,25 +225,17 @@ def friction_change(vessel: Vessel, ratio: float, speed: float) -> float:
 def fit_screws(vessel: Vessel, speed: float, shaft: float) -> tuple[Vessel, float]:
     """The vessel with all screws larger by one factor, so that it holds a speed [m/s] at a shaft speed [rev/s].
 
-    Also the factor: nan where none from 0.5 to 2 does, and the screws stay. A screw that is given by the speed for its
-    shaft speed gets another shaft speed instead.
+    Also the factor: 1 where none from 0.5 to 2 does. A screw about its service speed gets another shaft speed.
     """
-    screws = {path: unit for path, unit in vessel.units.items() if path.startswith("thruster.")}
-    about = {path: shaft * vessel_particulars(vessel)["U_0"] / speed for path in screws if path.endswith(".n_0")}
-    if about:
-        return vessel.with_values(about), 1.0
-    screws = {path: unit for path, unit in screws.items() if path.rpartition(".")[2] in SCREW}
-    orders = straight_orders(vessel, shaft)
+    screws = {path: unit for path, unit in vessel.units.items() if path.rpartition(".")[2] in SCREW}
+    orders, (low, high) = straight_orders(vessel, shaft), SCREW_SIZES
 
     def with_size(factor: float) -> Vessel:
-        sizes = {"m": factor, "kg": factor**3}
+        sizes = {"m": factor, "kg": factor**3, "s": factor}  # of n_0 alone
         return vessel.with_values({path: vessel.parameters[path] * unit_value(screws[path], sizes) for path in screws})
 
     def surplus(factor: float) -> float:
         return float(straight_acceleration(with_size(factor), speed, orders)[0])
 
-    low, high = SCREW_SIZES
-    if not surplus(low) < 0 < surplus(high):
-        return vessel, math.nan
-    factor = bisect_root(surplus, low, high, 40)
+    factor = bisect_root(surplus, low, high, 40) if surplus(low) < 0 < surplus(high) else 1.0
     return with_size(factor), factor

@@ -180,6 +180,8 @@ def finish_guess(
     body = "\n".join(lines)
     vessel = check_document(tomllib.loads(body), file)
     n = service_shaft(vessel, speed, most)
+    if n is None:
+        raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
     rate = yaw_growth(vessel, speed, straight_orders(vessel, n))
     verdict = (
         f"course-{'stable' if rate < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({rate:+.4f} t))"
@@ -648,9 +650,8 @@ def straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     }
 
 
-def service_shaft(vessel: Vessel, speed: float, most: float) -> float:
+def service_shaft(vessel: Vessel, speed: float, most: float) -> float | None:
     """Shaft speed [rev/s] or force (`drive_scale`) at which thrust equals resistance, by bisection up to a greatest."""
-    n = balanced_shaft_speed(lambda n: float(straight_acceleration(vessel, speed, straight_orders(vessel, n))[0]), most)
-    if n is None:
-        raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
-    return n
+    return balanced_shaft_speed(
+        lambda n: float(straight_acceleration(vessel, speed, straight_orders(vessel, n))[0]), most
+    )
