@@ -20,9 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
 
 from shipid.data.dataset import read_dataset, write_dataset
-from shipid.errors import DivergenceError, ShipidError
+from shipid.errors import DivergenceError
 from shipid.metrics import position_error
 from shipid.study.cells import evaluate_cell, fit_method, work_of
 from shipid.study.new import draft_study, proposed_horizon
@@ -30,7 +31,7 @@ from shipid.study.plan import build_plan
 from shipid.study.prepare import obtain_runs, prepare, runs_by_amount
 from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
-from shipid.vessel.similar import nearest_ships, read_ships, similar_vessels, vessel_particulars
+from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
 from shipid.vessel.template import service_shaft
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -75,7 +76,12 @@ def bundled_options(name: str) -> dict[str, Any]:
     sizes |= (
         {"propeller-diameter": 6.7} if name == "mariner" else {}
     )  # 22 feet: the usual guess is too small for 60 rpm
-    return sizes | {"speed": U, "rpm": 60 * service_shaft(vessel, U, 1000.0), "propulsor": propulsor, "shafts": shafts}
+    return sizes | {
+        "speed": U,
+        "rpm": 60 * (service_shaft(vessel, U, 1000.0) or 0.0),
+        "propulsor": propulsor,
+        "shafts": shafts,
+    }
 
 
 def log_of(ship: str, folder: Path) -> tuple[str, Sequence[str], str, list[str]]:
@@ -103,18 +109,11 @@ def compute_ship(ship: str) -> dict[str, Any]:
             return {"words": words, "fault": done.stderr.strip()}
         own, log = load_vessel(guess), folder / "log.parquet"
         ships = [one for one in read_ships() if not (without and one.key.startswith(without))]
-        known = vessel_particulars(own)
-        count = len([*nearest_ships(known, ships)])
-        for some in range(count, NEAREST - 1, -1):  # those that can be scaled
-            try:
-                found = similar_vessels(known, ships, some, own)
-                break
-            except ShipidError:
-                continue
+        found = [*similar_vessels(vessel_particulars(own), ships, own)]
         files = {"guess": str(guess)}
-        for place, one in enumerate(found, start=1):
+        for place, (_, one) in enumerate(found, start=1):
             files[f"near-{place}"] = str(folder / f"near-{place}.toml")
-            Path(files[f"near-{place}"]).write_text(one.text(), encoding="utf-8")
+            Path(files[f"near-{place}"]).write_text(tomlkit.dumps(one.document), encoding="utf-8")
         dataset = read_dataset(log)
         ahead, step, _ = proposed_horizon(own, survey_dataset(dataset))
         tests = np.random.default_rng(len(runs)).choice(runs, len(runs) // 3, replace=False).tolist()
@@ -143,9 +142,11 @@ def compute_ship(ship: str) -> dict[str, Any]:
                 break
             except DivergenceError as error:
                 lost.append(str(error.path).removeprefix("family."))
-    return {"words": words, "lost": lost, "near": [(one.source, one.ratio, one.distance) for one in found]} | errors_of(
-        plan, prepared
-    )
+    return {
+        "words": words,
+        "lost": lost,
+        "near": [(one.key, one.name, distance) for distance, one in found],
+    } | errors_of(plan, prepared)
 
 
 def errors_of(plan: Any, prepared: Any) -> dict[str, Any]:
@@ -217,13 +218,13 @@ def main() -> None:
         for key, other in pairs:
             print(f"| {COLUMNS[key]}, over guess, five runs | {ratio_words([row[key] / row[other] for row in rows])} |")
         print()
-    print("| ship | nearest three (ratio of lengths, distance) | guess [m] | nearest | three | best by log |")
+    print("| ship | nearest three (distance) | guess [m] | nearest | three | best by log |")
     print("| --- | --- | ---: | ---: | ---: | --- |")
     for ship, one in found.items():
         if "errors" not in one:
             print(f"| {ship}: {one['words']} | {one['fault']} | | | | |")
             continue
-        near = ", ".join(f"{source} ({ratio:.3g}, {far:.2f})" for source, ratio, far in one["near"][:NEAREST])
+        near = ", ".join(f"{key} ({far:.2f})" for key, _, far in one["near"][:NEAREST])
         errors = one["errors"]
         cells = [f"{errors[key]:.3g}" for key in ("guess", "near 1", "mean of 3")]
         print(f"| {ship}: {one['words']} | {near} | {' | '.join(cells)} | {one['best']}, {errors['by log']:.3g} |")
