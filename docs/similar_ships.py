@@ -73,19 +73,13 @@ def bundled_options(name: str) -> dict[str, Any]:
     L, B, T, U = (float(known[key]) for key in ("L_pp", "B", "T", "U_0"))
     block = vessel.parameters["inertia.m"] / (vessel.document["constants"]["rho"] * L * B * T)
     sizes = {"length": L, "beam": B, "draught": T, "block": min(max(block, 0.4), 0.9)}
-    sizes |= (
-        {"propeller-diameter": 6.7} if name == "mariner" else {}
-    )  # 22 feet: the usual guess is too small for 60 rpm
-    return sizes | {
-        "speed": U,
-        "rpm": 60 * (service_shaft(vessel, U, 1000.0) or 0.0),
-        "propulsor": propulsor,
-        "shafts": shafts,
-    }
+    sizes |= {"propeller-diameter": 6.7} if name == "mariner" else {}  # 22 feet: the guess is too small for 60 rpm
+    rpm = 60 * (service_shaft(vessel, U, 1000.0) or 0.0)
+    return sizes | {"speed": U, "rpm": rpm, "propulsor": propulsor, "shafts": shafts}
 
 
 def log_of(ship: str, folder: Path) -> tuple[str, Sequence[str], str, list[str]]:
-    """Words on a ship, options of its first guess, what is left out, and the argument that names its log or truth."""
+    """Words on a ship, options of its first guess, what is left out, and its runs; its log is written."""
     if ship in BUNDLED:
         options = [word for key, value in bundled_options(ship).items() for word in (f"--{key}", str(value))]
         plan = build_plan(tomllib.loads(draft_study([ship], None, folder / "truth.toml").text), folder / "truth.toml")
