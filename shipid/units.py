@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 RPM = 1.0 / 60.0
 """Revolutions per second in one revolution per minute."""
@@ -20,6 +20,8 @@ SYMBOLS = ("kg", "m", "s", "N", "rad", "deg", "rev", "Pa", "W", "J", "K", "Hz", 
 _POWER = r"\^-?\d+(?:\.\d+)?"
 _PRODUCT = rf"(?:{'|'.join(SYMBOLS)})(?:{_POWER})?"
 _PRODUCT = rf"{_PRODUCT}(?: {_PRODUCT})*"
+_DERIVED = {"N": "kg m/s^2", "Pa": "kg/m/s^2", "J": "kg m^2/s^2", "W": "kg m^2/s^3", "Hz": "1/s"}
+_FACTOR = re.compile(r"([^\s^]+)(?:\^(\S+))?")
 _QUOTIENT = rf"(?:{_PRODUCT}|1(?=/))(?:/{_PRODUCT})*"
 
 
@@ -38,6 +40,24 @@ def _is_unit_product(unit: str) -> bool:
     while (flat := re.sub(rf"\({_QUOTIENT}\)", "m", unit)) != unit:
         unit = flat
     return re.fullmatch(_QUOTIENT, unit) is not None
+
+
+def unit_value(unit: str, sizes: Mapping[str, float]) -> float:
+    """The value of a unit, see `unit_fault`, in which m, s and kg have these values, or 1; N is kg m s^-2, and so on.
+
+    With ratios of length, time and mass as `sizes` it is the ratio of numbers in this unit.
+    """
+    while inner := re.search(r"\(([^()]*)\)", unit):
+        sizes = {**sizes, (name := f"<{len(unit)}>"): unit_value(inner[1], sizes)}
+        unit = unit.replace(inner[0], name)
+    above, *below = (
+        math.prod(
+            (unit_value(_DERIVED[symbol], sizes) if symbol in _DERIVED else sizes.get(symbol, 1.0)) ** float(power or 1)
+            for symbol, power in _FACTOR.findall(part)
+        )
+        for part in unit.split("/")
+    )
+    return float(above / math.prod(below))
 
 
 def length_decimals(length: float) -> int:

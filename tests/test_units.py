@@ -19,6 +19,7 @@ from shipid.units import (
     percent_text,
     significant_digits,
     unit_fault,
+    unit_value,
 )
 
 
@@ -122,3 +123,23 @@ def test_products_of_powers_are_units(unit: str) -> None:
 def test_no_unit_of_shipid_is_refused_with_all_that_are(unit: str, begin: str) -> None:
     assert unit_fault(unit).startswith(begin)
     assert "kg, m, s, N, rad, deg, rev, Pa, W, J, K and Hz" in unit_fault(unit)
+
+
+@pytest.mark.parametrize(
+    ("unit", "value"),
+    [
+        ("kg m^-5 s^4", 7 * 2**-5 * 3**4),
+        ("N s^1.5/m", 7 * 3**-0.5),
+        ("1/(kg m)/s", 1 / 42),
+        ("rad/s", 1 / 3),
+        ("W", 28 / 27),
+        ("prime", 1),
+        ("-", 1),
+        ("(m/(s kg))^2", (2 / 21) ** 2),
+        ("Pa", 7 / 18),
+        ("rev/s^2", 1 / 9),
+    ],
+)
+def test_a_unit_has_the_value_of_its_parts(unit: str, value: float) -> None:
+    assert unit_value(unit, {"m": 2, "s": 3, "kg": 7}) == pytest.approx(value, rel=1e-15)
+    assert unit_value(unit, {}) == 1

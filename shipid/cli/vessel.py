@@ -146,6 +146,57 @@ def vessel_new(
         answer.say("\n".join(notes), notes=notes)
 
 
+@app.command("similar")
+def vessel_similar(
+    length: Annotated[float | None, typer.Option(min=0.01, help="m, between perpendiculars")] = None,
+    beam: Annotated[float | None, typer.Option(min=0.01, help="m")] = None,
+    draught: Annotated[float | None, typer.Option(min=0.01, help="m")] = None,
+    block: Annotated[float | None, typer.Option(min=0.01, help="block coefficient")] = None,
+    speed: Annotated[float | None, typer.Option(min=0.01, help="m/s, in service")] = None,
+    vessel: Annotated[
+        str | None, typer.Option(help="your own, such as a first guess: its particulars, and commands to take")
+    ] = None,
+    ships: Annotated[
+        Path | None, typer.Option("--from", help="folder of vessels of your own beside bundled ones")
+    ] = None,
+    number: Annotated[int, typer.Option(min=1, help="of ships")] = 3,
+    data: Annotated[Path | None, typer.Option(help="dataset whose first runs rank the ships; needs --vessel")] = None,
+    runs: Annotated[int, typer.Option(min=1, help="of the dataset that rank the ships")] = 5,
+    out: Annotated[Path | None, typer.Option(help="folder to write a vessel a ship into")] = None,
+    as_json: Json = False,
+) -> None:
+    """Find the ships most like yours and scale them to its length by Froude's law."""
+    import tomlkit
+
+    from shipid.files import write_text
+    from shipid.study.screen import errors_on_runs
+    from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
+
+    own = None if vessel is None else shipid.load_vessel(vessel)
+    given = {"L_pp": length, "B": beam, "T": draught, "C_b": block, "U_0": speed}
+    known = ({} if own is None else vessel_particulars(own)) | {key: x for key, x in given.items() if x is not None}
+    if lacking := "length" if "L_pp" not in known else "vessel" if data is not None and own is None else None:
+        remedy = {"length": "or a --vessel with particulars.L_pp", "vessel": "whose screws and helms the log drives"}
+        raise ShipidError(f"missing: give it, {remedy[lacking]}", path=f"--{lacking}")
+    rows: list[dict[str, Any]] = [
+        {"ship": one.key, "distance": distance, "vessel": one}
+        for distance, one in similar_vessels(known, read_ships(ships), own)
+    ]
+    if data is not None:
+        errors = errors_on_runs([row["vessel"] for row in rows], shipid.read_dataset(data), runs)
+        rows = [row | {"error [m]": error} for row, error in zip(rows, errors, strict=True)]
+        rows.sort(key=lambda row: float(row["error [m]"]))
+    best = [row.pop("vessel") for row in rows][:number]
+    if out is not None:
+        for one in best:
+            write_text(check_output(out / f"{one.key}.toml", endings=(".toml",)), tomlkit.dumps(one.document))
+    with open_answer(as_json) as answer:
+        answer.records("ships", rows[:number])
+        notes = [f"{one.name}: {one.document['source']}" for one in best]
+        answer.say("\n".join(notes), notes=notes)
+        answer.say("" if out is None else f"vessels -> {out}", out=out)
+
+
 def _parse_place(text: str) -> tuple[float, float]:
     """The place X,Y [m] of a thruster; ShipidError for another text."""
     try:

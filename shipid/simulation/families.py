@@ -212,9 +212,11 @@ def read_families(document: str | Path) -> dict[str, VesselFamily]:
     """
     file, content = read_family_document(document)
     families = resolve_families([Family.model_validate(block) for block in content["family"]], file)
-    if other := next((one.name for one in families if one.base is None), None):
+    if other := next((one.name for one in families if one.base is None or one.similar), None):
         raise DocumentError(
-            "its members are no vessels: only a family with a base is drawn here", file=file, path=f"family.{other}"
+            "its members are no variants of one vessel: only a family with a base alone is drawn here",
+            file=file,
+            path=f"family.{other}",
         )
     bases = [change_structure(one, load_vessel(str(one.base), file.parent)) for one in families]
     return {one.name: VesselFamily(one, base, file) for one, base in zip(families, bases, strict=True)}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any, get_args
 
@@ -20,6 +21,7 @@ from shipid.observer import Observer, filter_bank
 from shipid.study.schema import PAIRED_ROLES, MeanBlock, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, change_structure, draw_members, resolve_families
+from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
 
 NO_MODEL = "none"
 NO_METHOD = "alone"  # of the rows of A in comparisons of runs, whose N_D is 0: no data improve it
@@ -106,7 +108,8 @@ def bases_of(
     simulators : those that are known, by `key`, to which those that are read now are added.
     """
     if family.base is not None:
-        return [change_structure(family, named_vessel(family.base, file, f"{path}.base", known))]
+        vessel = change_structure(family, named_vessel(family.base, file, f"{path}.base", known))
+        return [*_similar_bases(family, vessel, file, f"{path}.similar", known)] if family.similar else [vessel]
     kind, value = next((kind, value) for kind in SIMULATORS if (value := getattr(family, kind)) is not None)
     found = named_simulators(kind, value, file, f"{path}.{kind}", simulators, trust)
     if family.structure or (family.perturb and kind == "predictions"):
@@ -115,6 +118,25 @@ def bases_of(
             path=f"{path}.{'structure' if family.structure else 'perturb'}",
         )
     return [*found]
+
+
+def _similar_bases(family: Family, own: Vessel, file: Path, path: str, known: dict[str, Vessel]) -> Iterator[Vessel]:
+    """The ships most like a family's base, scaled: known ones, or found now and known from now on."""
+    count = family.similar or 0
+    names = [f"{own.key} {own.digest}: similar {place} of {count}, {family.ships}" for place in range(count)]
+    if any(name not in known for name in names):
+        places = [] if family.ships is None else [file.parent / family.ships, Path(family.ships)]
+        try:
+            ships = read_ships(next((place for place in places if place.is_dir()), places[-1] if places else None))
+            if own.length is None:
+                raise ShipidError("the base gives no particulars.L_pp, to which ships are scaled")
+            found = [*islice(similar_vessels(vessel_particulars(own), ships, own), count)]
+            if len(found) < count:
+                raise ShipidError(f"{len(found)} ships can be scaled: ask for fewer, or name a folder `ships`")
+        except ShipidError as error:
+            raise DocumentError(f"{error.file}: {error.message}" if error.file else error.message, path=path) from None
+        known |= {name: vessel for name, (_, vessel) in zip(names, found, strict=True)}
+    return (known[name] for name in names)
 
 
 def named_simulators(
@@ -143,16 +165,11 @@ def foundations_of(
                 f"{family.name!r} is taken by the foundation without physics: rename the family", path=f"family.{index}.name"
             )
         bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
-        vessel = bases[0] if isinstance(bases[0], Vessel) else None
         parent = families[_root(study.family, index)]
-        for block in ("identify", "observer") if vessel is None else ():
+        for block in () if isinstance(bases[0], Vessel) else ("identify", "observer"):
             if getattr(family, block) is not None:
                 words = "it needs the equations of a vessel, and this family has none: take a family with a base"
                 raise DocumentError(words, path=f"family.{index}.{block}")
-        identify = None if family.identify is None or vessel is None else _identify(study, family, index, vessel)
-        observer = None if family.observer is None or vessel is None else _observer(study, family, index, vessel)
-        ways = (parent.description, IDENTIFIED if identify else "", OBSERVED if observer else "")
-        words = family.description or ", ".join(filter(None, ways))
         if len(bases) > 1:
             parent = parent.model_copy(update={"members": len(bases)})
         drawn = [
@@ -164,6 +181,13 @@ def foundations_of(
             name = variant.name
             if parent is not family:
                 name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
+            identify = observer = None
+            if isinstance(base, Vessel):
+                identify = None if family.identify is None else _identify(study, family, index, base)
+                observer = None if family.observer is None else _observer(study, family, index, base)
+            of = base.name if isinstance(base, Vessel) and family.similar else parent.description
+            ways = (of, IDENTIFIED if identify else "", OBSERVED if observer else "")
+            words = family.description or ", ".join(filter(None, ways))
             foundations.append(Foundation(name, family.name, variant.member, variant, base, words, identify, observer))
     foundations += [
         _mean_of_foundations(block, f"model.{place}", foundations) for place, block in enumerate(study.model)

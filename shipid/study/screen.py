@@ -15,14 +15,16 @@ from scipy.stats import kendalltau
 
 from shipid.arguments import check_choice, check_class, check_whole_number
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows
+from shipid.data.windows import Windows, cut_windows
 from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, suggest_name
 from shipid.evidence import SIGNIFICANT, holm_correction
-from shipid.hybrid.physics import check_columns
+from shipid.hybrid.physics import Physics, check_columns
 from shipid.metrics import BINS, position_error, rank_correlation, summarise_errors, tally_quantile
+from shipid.study.new import proposed_horizon
 from shipid.study.plan import Plan
-from shipid.study.prepare import instants_of, not_measured, partition, physics_of
+from shipid.study.prepare import instants_of, not_measured, partition, physics_of, window_memory
+from shipid.study.survey import survey_dataset
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, change_structure, draw_members
 
@@ -33,12 +35,17 @@ MEMBERS_OF_BLOCK = 512  # of a block
 NUMBERS_OF_BLOCK = 12_000_000
 QUANTILES_OF_A = (0.05, 0.25, 0.5, 0.75, 0.95)
 MOST_DRIVERS = 5  # of a family that are named
+PER_HORIZON = 8  # instants of prediction in one horizon, of ranks by a log
 ROW_COLUMNS = ("family", "member", "A", "A_90", "diverged")
 
 
 def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of vessels, or all that draw factors from a range; DocumentError if nothing is drawn."""
-    drawn = [one for one in plan.families if one.base is not None and any(block.drawn for block in one.perturb)]
+    drawn = [
+        one
+        for one in plan.families
+        if one.base is not None and not one.similar and any(block.drawn for block in one.perturb)
+    ]
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
         which = "no family draws a" if name is None else f"{name!r} draws no"
@@ -87,6 +94,24 @@ def screen(
             named = family.model_copy(update={"members": count})
             variants = draw_members(named, base, plan.file, numbers)
             yield _rows_of_block(plan, dataset, (pool, test), base, variants, device, engine)
+
+
+def errors_on_runs(vessels: Sequence[Vessel], dataset: Dataset, count: int) -> list[float]:
+    """Mean position error [m] of the physics alone of each vessel over the first runs, so many of them.
+
+    Over the horizon and at the step that `study new` proposes for the first vessel, with held orders.
+    """
+    first = dataset.select(dataset.runs[:count])
+    ahead, step, _ = proposed_horizon(vessels[0], survey_dataset(first))
+    steps = round(ahead / step)
+    windows = cut_windows(first, horizon=steps, step=step, interval=max(round(steps / PER_HORIZON), 1) * step)
+    errors = []
+    for vessel in vessels:
+        check_columns(vessel, windows.columns, vessel.file)
+        instants = windows.instants(known=False, hidden=window_memory(vessel, first, windows))
+        paths, _ = Physics(vessel, steps, step, "rk4", None, "position").variant_paths(instants)
+        errors.append(float(position_error(paths[:, 0], windows.future).mean()))
+    return errors
 
 
 def _rows_of_block(

@@ -209,6 +209,10 @@ class Family(CheckedModel, BaseModel):
         default=None, description='a function of Python in place of a base, such as "my_ship:simulate"'
     )
     fmu: str | None = Field(default=None, description="an FMU, or the document of its table, in place of a base")
+    similar: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        default=None, description="so many ships most like the base, scaled to its length, in its place: a member each"
+    )
+    ships: str | None = Field(default=None, description="a folder of vessels of one's own among which `similar` looks")
     extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
     members: Annotated[int, Field(ge=1, le=100000)] = 1
     seed: int = 0
@@ -332,6 +336,8 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         changes = {
             **{key: getattr(family if own else parent, key) for key in SOURCES},
             "extends": None,
+            "similar": family.similar or parent.similar,
+            "ships": family.ships or parent.ships,
             "structure": parent.structure | family.structure,
             "perturb": [*parent.perturb, *family.perturb],
             "redraw": parent.redraw or family.redraw,
@@ -343,6 +349,10 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         resolved._inherited = len(parent.perturb)
         if all(getattr(resolved, key) is None for key in SOURCES):
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
+        if resolved.similar and resolved.base is None:
+            raise DocumentError(
+                "needs a `base`, to which it looks for similar ships", file=file, path=f"{where}.similar"
+            )
         drawn = any(block.drawn for block in resolved.perturb)
         if resolved.members > 1 and not (resolved.equal or resolved.identify or resolved.observer or drawn):
             raise DocumentError(

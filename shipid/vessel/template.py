@@ -179,8 +179,10 @@ def finish_guess(
     """Check a document, line by line, and put above it what it needs for a speed [m/s] and whether it is stable."""
     body = "\n".join(lines)
     vessel = check_document(tomllib.loads(body), file)
-    n = _service_shaft(vessel, speed, most)
-    rate = yaw_growth(vessel, speed, _straight_orders(vessel, n))
+    n = service_shaft(vessel, speed, most)
+    if n is None:
+        raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
+    rate = yaw_growth(vessel, speed, straight_orders(vessel, n))
     verdict = (
         f"course-{'stable' if rate < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({rate:+.4f} t))"
     )
@@ -640,7 +642,7 @@ def _quote_toml(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
+def straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
     return {
         name: n * drive_scale(name) if drive_scale(name) else neutral_value(name)
@@ -648,11 +650,8 @@ def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     }
 
 
-def _service_shaft(vessel: Vessel, speed: float, most: float) -> float:
+def service_shaft(vessel: Vessel, speed: float, most: float) -> float | None:
     """Shaft speed [rev/s] or force (`drive_scale`) at which thrust equals resistance, by bisection up to a greatest."""
-    n = balanced_shaft_speed(
-        lambda n: float(straight_acceleration(vessel, speed, _straight_orders(vessel, n))[0]), most
+    return balanced_shaft_speed(
+        lambda n: float(straight_acceleration(vessel, speed, straight_orders(vessel, n))[0]), most
     )
-    if n is None:
-        raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
-    return n

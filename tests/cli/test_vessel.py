@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+import tomlkit
 
+from shipid.data.dataset import Dataset, write_dataset
 from shipid.document import bundled_documents
+from shipid.simulation.manoeuvre import Zigzag
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of
 
@@ -91,3 +96,44 @@ def test_a_name_that_no_document_may_hold_is_refused(name: str, tmp_path: Path) 
     given = ("--length", 30, "--beam", 8, "--draught", 2.8, "--block", 0.55, "--out", tmp_path / "x.toml")
     assert "text with a control character" in ended("vessel", "new", *given, "--name", name)[2]
     assert not (tmp_path / "x.toml").exists()
+
+
+SIMILAR = ("vessel", "similar", "--length", 320, "--beam", 50, "--draught", 19, "--block", 0.82)
+
+
+def test_similar_ships_are_written_and_load(tmp_path: Path) -> None:
+    text = output_of(*SIMILAR, "--number", 1, "--out", tmp_path)
+    assert "esso-190k scaled; friction by ITTC-57" in text
+    assert load_vessel(tmp_path / "esso-190k.toml").length == pytest.approx(320)
+    assert ended(*SIMILAR, "--number", 1, "--out", tmp_path)[2].endswith("name another file to write\n")
+
+
+def test_a_log_ranks_similar_ships_by_their_error(tmp_path: Path) -> None:
+    """The log is that of one of them: no other ship errs as little."""
+    log, mine = tmp_path / "log.parquet", tmp_path / "mine.toml"
+    kinds = [Zigzag(name=f"zz {angle}", n_rpm=627, angle_deg=angle, duration=60, execute_at=5) for angle in (10, 20)]
+    frame = perform_manoeuvres(load_vessel("kvlcc2-l7"), kinds, step=0.1)
+    frame = frame[[name for name in frame if not str(name).startswith("actual.")]].astype({"run": "str"})
+    write_dataset(Dataset(frame, {"clock": "run", "flags": []}), log)
+    mine.write_text(tomlkit.dumps(load_vessel("kvlcc2-hsva").document))
+    found = json.loads(output_of("vessel", "similar", "--vessel", mine, "--data", log, "--json"))
+    errors = [row["error [m]"] for row in found["ships"]]
+    assert found["ships"][0]["ship"] == "kvlcc2-l7"
+    assert errors == sorted(errors)
+    assert errors[1] > 2 * errors[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--beam", 3), "error: --length: missing: give it, or a --vessel with particulars.L_pp"),
+        (("--length", 3, "--data", "log.parquet"), "error: --vessel: missing: give it, whose screws"),
+        (("--length", -3), "error: Invalid value for '--length': Input should be greater"),
+        (("--length", 30, "--from", "nowhere"), "error: nowhere: no vessel in the TOML files of this folder"),
+    ],
+)
+def test_similar_ships_of_nothing_are_one_line(options: tuple[Any, ...], message: str) -> None:
+    status, _, err = ended("vessel", "similar", *options)
+    assert status in (1, 2)
+    assert err.startswith(message)
+    assert err.count("\n") == 1

@@ -100,3 +100,49 @@ def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(
     assert fitted.identify is not None
     assert again.identify is not None
     assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
+
+
+def test_similar_ships_are_the_members_of_a_family(tmp_path: Path) -> None:
+    """Each is the same to the bit whatever else is declared, and a stored study needs no folder of ships."""
+    document = tiny_plan(tmp_path).document
+    folder = tmp_path / "fleet"
+    folder.mkdir()
+    ship = load_vessel("gunnerus-33.9").document
+    (folder / "long.toml").write_text(tomlkit.dumps(ship | {"particulars": ship["particulars"] | {"B": 8.0}}))
+    near = {"name": "near", "base": "gunnerus-28.9", "similar": 3, "ships": "fleet"}
+    fit = {"name": "fit", "extends": "near", "identify": {"parameters": ["inertia.m"]}}
+    document["family"] = [*document["family"], near, fit]
+    plan = build_plan(document, tmp_path / "tiny.toml")
+    of = {one.name: one for one in plan.foundations}
+    assert {f"near-{place}" for place in (1, 2, 3)} | {f"fit-{place}" for place in (1, 2, 3)} < of.keys()
+    sizes = [of[f"near-{place}"].vessel for place in (1, 2, 3)]
+    assert all(one is not None and one.length == pytest.approx(28.9) for one in sizes)
+    assert "long" in {one.key for one in sizes if one is not None}
+    document["family"] = [near | {"name": "alone"}]
+    other = {one.name: one for one in build_plan(document, tmp_path / "tiny.toml").foundations}
+    for place, one in enumerate(sizes, start=1):
+        again = other[f"alone-{place}"].vessel
+        assert again is not None
+        assert one is not None
+        assert again.digest == one.digest
+    (folder / "long.toml").unlink()
+    assert build_plan(plan.document, tmp_path / "tiny.toml", vessels=plan.vessels).digest == plan.digest
+
+
+@pytest.mark.parametrize(
+    ("block", "path", "words"),
+    [
+        ({"base": "gunnerus-28.9", "similar": 60}, "family.near.similar", "ships can be scaled: ask for fewer"),
+        ({"base": "gunnerus-28.9", "similar": 1, "ships": "none"}, "family.near.similar", "no vessel in the TOML"),
+        ({"predictions": "a.parquet", "similar": 1}, "family.near.similar", "needs a `base`"),
+        ({"base": "gunnerus-28.9", "similar": 0}, "family.near.similar", "0: must be at least 1"),
+    ],
+)
+def test_similar_ships_that_are_not_there_are_one_line(
+    tmp_path: Path, block: dict[str, Any], path: str, words: str
+) -> None:
+    document = tiny_plan(tmp_path).document
+    document["family"].append({"name": "near", **block})
+    with pytest.raises(DocumentError, match=words) as caught:
+        build_plan(document, tmp_path / "tiny.toml")
+    assert caught.value.path == path
