@@ -31,6 +31,7 @@ from shipid.study.workers import on_workers
 from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
+from shipid.vessel.similar import particulars_distance
 from shipid.vessel.template import Particulars, first_guess
 
 BUNDLED = {
@@ -108,16 +109,6 @@ def _known_particulars(vessel: Vessel) -> Particulars | None:
     return Particulars(L, B, T, block, U, propulsor, rpm=rpm, shafts=len(controls.drives))
 
 
-def particulars_distance(one: Particulars, other: Particulars) -> float:
-    """Distance of two ships over ln L, L / B, B / T, C_b and Froude number, each in units of its usual spread."""
-    numbers = [
-        (math.log(p.length) / 1.5, p.length / p.beam / 1.2, p.beam / p.draught / 0.6, p.block / 0.1,
-         p.service / math.sqrt(GRAVITY * p.length) / 0.05)
-        for p in (one, other)
-    ]  # fmt: skip
-    return math.dist(*numbers)
-
-
 def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
     """The nearest drawn ship with the same drive, scaled to the length of a ship; None where there is none."""
     mine = ship.particulars
@@ -126,8 +117,13 @@ def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
     kind = mine.propulsor, mine.units
     others = [one for one in drawn_ships(seed, drawn) if one.name != ship.name]
     near = [one for one in others if (one.particulars.propulsor, one.particulars.units) == kind]
-    near.sort(key=lambda one: particulars_distance(mine, one.particulars))
+    near.sort(key=lambda one: particulars_distance(_known_numbers(mine), _known_numbers(one.particulars)))
     return near[0].vessel(like=mine) if near else None
+
+
+def _known_numbers(given: Particulars) -> dict[str, float]:
+    """Particulars by their keys in a document of a vessel."""
+    return {"L_pp": given.length, "B": given.beam, "T": given.draught, "C_b": given.block, "U_0": given.service}
 
 
 def _template_of(ship: StudiedShip) -> Vessel | None:

@@ -162,7 +162,8 @@ def foundations_of(
     for index, family in enumerate(families):
         if family.name.lower() == NO_MODEL:
             raise DocumentError(
-                f"{family.name!r} is taken by the foundation without physics: rename the family", path=f"family.{index}.name"
+                f"{family.name!r} is taken by the foundation without physics: rename the family",
+                path=f"family.{index}.name",
             )
         bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
         parent = families[_root(study.family, index)]
