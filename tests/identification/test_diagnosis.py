@@ -92,6 +92,12 @@ def test_a_sound_log_is_not_blamed(seed: int) -> None:
     assert "no single cause" in found.sentence
 
 
+@pytest.mark.parametrize(("seed", "number"), [(50001, 19), (50001, 53), (50002, 115)])
+def test_the_luckiest_of_many_causes_is_not_blamed(seed: int, number: int, tmp_path: Path) -> None:
+    """Some cause is always two standard errors better, or much better in a few blocks of time."""
+    assert diagnose_log(draw_faulty_log(seed, number, draw_ship(number % 20, seed), 0), tmp_path) == ([], [])
+
+
 @pytest.mark.parametrize("key", ["sensor psi bias", "sensor r bias", "lever arm position"])
 def test_kinematics_alone_name_what_needs_no_vessel(key: str) -> None:
     log = log_of(2)
