@@ -22,7 +22,6 @@ LATE, EARLY = (0.3, 1.0, 2.0, 4.0), (-1.0, -0.3)  # delays from which a fit may 
 UNITS = tuple(sign * float(np.log(unit)) for unit in (1852 / 3600, np.pi / 180, 1 / 60) for sign in (1, -1))
 """Logarithms of the factors of a wrong unit: knots, degrees, minutes."""
 SPEEDS, COURSES = "runs at several speeds", "runs on opposite courses"
-GYRO = "name the column of a gyro or a compass as psi"
 BESIDE = "the command read beside its instrument"
 
 
@@ -135,8 +134,9 @@ def _divide_astern(name: str, motion: Motion, size: Array) -> Motion:
     return motion.put({name: np.where(values < 0, values * np.exp(-size[0]), values)})
 
 
-def _negate(name: str, motion: Motion, _: Array) -> Motion:
-    return motion.put({name: -motion.columns[name]})
+def multiply_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
+    """The log with columns times their signs (N,), or one of all rows."""
+    return motion.put({name: signs * motion.columns[name] for name in names})
 
 
 def _advance(names: Sequence[str], motion: Motion, size: Array) -> Motion:
@@ -222,7 +222,7 @@ def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]
         repair=f"{column}factor = {{over0}}  # times what is there", equals=strength, tells=BESIDE,
     )  # fmt: skip
     yield Cause(
-        f"{key} sign", partial(_negate, name), repair=f"{column}sign = -1  # times what is there",
+        f"{key} sign", partial(multiply_signs, [name], -1.0), repair=f"{column}sign = -1  # times what is there",
         equals=("mirror image of the motion",) if angle else (), tells="one turn whose side is known",
     )  # fmt: skip
     yield Cause(
@@ -281,12 +281,13 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
         )  # fmt: skip
     for name in ("v", "r", "psi"):
         yield Cause(
-            f"sensor {name} sign", partial(_negate, name), repair=f"[columns.{name}]\nsign = -1  # times what is there"
+            f"sensor {name} sign", partial(multiply_signs, [name], -1.0),
+            repair=f"[columns.{name}]\nsign = -1  # times what is there",
         )  # fmt: skip
-    of_velocity = ("sensor velocity delay",)
+    gyro = "name the column of a gyro or a compass as psi"
     late: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
-        "u": (("u",), "velocity", of_velocity),
-        "v": (("v",), "velocity", of_velocity),
+        "u": (("u",), "velocity", ("sensor velocity delay",)),
+        "v": (("v",), "velocity", ("sensor velocity delay",)),
         "r": (("r",), "yaw rate", ()),
         "psi": (("psi",), "heading", ()),
         "velocity": (VELOCITY, "velocity", ("sensor u delay", "sensor v delay")),
@@ -299,11 +300,14 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
             equals=equals, tells="turns to both sides", cost=float(key in "uv"),
         )  # fmt: skip
-    yield Cause("heading is course", _heading_from_course, repair=GYRO)
+    yield Cause("heading is course", _heading_from_course, repair=gyro)
     yield Cause(
-        "heading is course / and drift is lost", _heading_about_pivot, (0.05 * scales.length,), "m", repair=GYRO,
+        "heading is course / and drift is lost", _heading_about_pivot, (0.05 * scales.length,), "m", repair=gyro,
         starts=(0.4 * scales.length,), equals=("sensor v scale",),
     )  # fmt: skip
+    yield Cause(
+        "heading is course / and drift is that of the physics", lambda log, _: replace(log, course=True), repair=gyro
+    )
     arms = {"position": ("lever arm velocity", "sensor position delay"), "velocity": ("lever arm position",)}
     for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
         yield Cause(

@@ -36,11 +36,14 @@ makes them err is seen on the log with its noise once more.
 
 - `none`: no cause lowers the misfit by `DECISIVE` for each bump, or by more standard errors over blocks of time than
   the best of so many causes has by chance (normal, with probability `LEVEL`: Bonferroni); or those that do so lower the
-  error of the paths by less than a share `WORTH`; or that error is noise; or they are smaller than what a log has
-  anyhow (a command that is a row late).
+  error of the paths by less than a share `WORTH` of that of the log as given; or that error is noise; or they are
+  smaller than what a log has anyhow (a command that is a row late).
+- A cause that lowers the misfit of the equations of heading and position by `PLAIN` for each bump needs neither:
+  kinematics hold for every ship, and paths may drown in noise.
 - Causes tie with that of least misfit where they are worse by less than `APART` standard errors, or the share `ALIKE`
   of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
   `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
+- Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
 - `current by run` gains only what is beyond an unknown force of each run, as gusts are.
 - A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
   naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
@@ -69,7 +72,7 @@ from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_col
 from shipid.engine.casadi import input_symbols, memory_along, summed_rates
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
-from shipid.identification.causes import GYRO, Cause, Motion, Scales, list_causes, rotate_heading
+from shipid.identification.causes import Cause, Motion, Scales, list_causes, multiply_signs, rotate_heading
 from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
@@ -96,8 +99,7 @@ HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 # pieces of a log over which it is seen whether a shaft turns astern; steps of a piece; rounds
 SIGN, SIGN_STEPS, SIGN_ROUNDS = 1.0, 4, 4
-MOST_DRIFT = 0.9  # sine of the drift that the physics may say
-LEVEL, APART = 0.2, 2.0  # probability that any cause is so good by chance; standard errors
+LEVEL, APART = 0.05, 2.0  # probability that any cause is so good by chance; standard errors
 BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
 DECISIVE, ALIKE = 2.0, 0.3  # gain for each bump that needs no standard error; share of a gain that a runner-up may lack
 WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the paths; of a cause without a size, as a wrong sign
@@ -150,7 +152,7 @@ class _Fit:
     @property
     def counts(self) -> bool:
         """Whether it is more than what any log has."""
-        return not self.cause.trial or bool(np.linalg.norm(self.theta) >= self.cause.least)
+        return bool(np.linalg.norm(self.theta) >= self.cause.least)
 
 
 class _Log:
@@ -434,12 +436,7 @@ class _VesselLog(_Log):
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log or with the vessel."""
-        course = Cause(
-            "heading is course / and drift is that of the physics",
-            lambda log, _: replace(log, course=True),
-            repair=GYRO,
-        )
-        return [*list_causes(self.vessel, self.commands, self.motion, self.scales), course, *_unsigned_shafts(self)]
+        return [*list_causes(self.vessel, self.commands, self.motion, self.scales), *_unsigned_shafts(self)]
 
     def memory(self, motion: Motion) -> Array:
         """Actuator states (M, N) that the orders of a log reach."""
@@ -488,7 +485,7 @@ class _VesselLog(_Log):
         v, rates = np.zeros(len(start)), _mapped_rates(self.model, len(start))
         for k in range(-SHORTEST, SHORTEST):
             at = np.clip(start + k, first, last)
-            sway[at] = states[row, at] = v = np.clip(v, -MOST_DRIFT * speed[at], MOST_DRIFT * speed[at])
+            sway[at] = states[row, at] = v = np.clip(v, -speed[at], speed[at])
             v = v + motion.step * np.array(rates(states[:, at], *(one[:, at] for one in inputs), motion.parameters))[1]
         drift = np.arcsin(sway / np.maximum(speed, 1e-12)) * np.sign(motion.columns["u"])
         return rotate_heading(replace(motion, course=False), [drift])
@@ -550,10 +547,6 @@ def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
     return ca.Function("accelerations", inputs, [rates[rows]], {"cse": True}).map("mapped", "serial", count, [4], [])
 
 
-def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
-    return motion.put({name: signs * motion.columns[name] for name in names})
-
-
 def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     """Shafts whose speed may lack its sign, each alone and all together.
 
@@ -568,18 +561,18 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     shafts = [name for name, values in turning.items() if 0 <= values.min() < values.max()]
     for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
         ahead, astern = (
-            (measured[:, every] - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2
+            (measured[:, every] - log.accelerations(multiply_signs(names, sign, motion), every)[[0, 2]]) ** 2
             for sign in (1, -1)
         )
         signs = np.ones(count)
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
-            weight = log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2]]
+            weight = log.weights(log.residuals(multiply_signs(names, signs, motion)))[[0, 2]]
             less = gaussian_filter1d(weight**2 @ (ahead - astern), SIGN)
             signs = np.repeat(np.where(less > 0, -1.0, 1.0), SIGN_STEPS)[:count]
         if (signs < 0).any():
             yield Cause(
                 " ".join([f"command {names[0]} unsigned", *(["/ with", *names[1:]] if len(names) > 1 else [])]),
-                partial(_put_signs, names, signs),
+                partial(multiply_signs, names, signs),
                 repair=f"{' and '.join(names)} without a sign: give the column that says ahead or astern",
                 equals=tuple(f"command {name} unsigned" for name in shafts),
                 tells="the column that says ahead or astern",
