@@ -30,6 +30,7 @@ class Motion:
     """A log at equal steps: columns (N,) SI of all stretches one after the other, and the numbers of the vessel (P,).
 
     stretches : slice of each stretch. runs : number of the run of each stretch. step : [s].
+    course : whether its heading is a course, of which the physics must say the drift.
     """
 
     columns: Mapping[str, Array]
@@ -37,6 +38,7 @@ class Motion:
     stretches: tuple[slice, ...]
     runs: tuple[int, ...]
     step: float
+    course: bool = False
 
     def put(self, columns: Mapping[str, Array]) -> Motion:
         """The same log with some columns replaced."""
@@ -67,7 +69,8 @@ class Cause:
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
     repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
-    cost : what its free signs add to the misfit. of_runs : whether each run has a size of its own.
+    cost : added to the misfit: for free signs, or for one column alone of an instrument that gives two.
+    of_runs : whether each run has a size of its own.
     """
 
     key: str
@@ -131,8 +134,9 @@ def _divide_astern(name: str, motion: Motion, size: Array) -> Motion:
     return motion.put({name: np.where(values < 0, values * np.exp(-size[0]), values)})
 
 
-def _negate(name: str, motion: Motion, _: Array) -> Motion:
-    return motion.put({name: -motion.columns[name]})
+def multiply_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
+    """The log with columns times their signs (N,), or one of all rows."""
+    return motion.put({name: signs * motion.columns[name] for name in names})
 
 
 def _advance(names: Sequence[str], motion: Motion, size: Array) -> Motion:
@@ -151,7 +155,7 @@ def _exchange(pairs: Sequence[tuple[str, str]], motion: Motion, _: Array) -> Mot
     return motion.put({a: motion.columns[b] for pair in pairs for a, b in (pair, pair[::-1])})
 
 
-def _turn_heading(motion: Motion, size: Array | Sequence[Array]) -> Motion:
+def rotate_heading(motion: Motion, size: Array | Sequence[Array]) -> Motion:
     """The heading less a bias, and velocities turned with it: those over ground stay."""
     columns = motion.columns
     turned = (columns["u"] + 1j * columns["v"]) * np.exp(1j * size[0])
@@ -166,7 +170,7 @@ def _heading_from_course(motion: Motion, _: Array) -> Motion:
 def _heading_about_pivot(motion: Motion, ahead: Array) -> Motion:
     """The heading of a log whose drift is lost: of a ship that turns about a point so far ahead [m]."""
     u = motion.columns["u"]
-    return _turn_heading(motion, [-np.arctan2(ahead[0] * motion.columns["r"] * np.sign(u), np.abs(u))])
+    return rotate_heading(motion, [-np.arctan2(ahead[0] * motion.columns["r"] * np.sign(u), np.abs(u))])
 
 
 def _move_to_origin(moves: str, motion: Motion, arm: Array) -> Motion:
@@ -218,7 +222,7 @@ def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]
         repair=f"{column}factor = {{over0}}  # times what is there", equals=strength, tells=BESIDE,
     )  # fmt: skip
     yield Cause(
-        f"{key} sign", partial(_negate, name), repair=f"{column}sign = -1  # times what is there",
+        f"{key} sign", partial(multiply_signs, [name], -1.0), repair=f"{column}sign = -1  # times what is there",
         equals=("mirror image of the motion",) if angle else (), tells="one turn whose side is known",
     )  # fmt: skip
     yield Cause(
@@ -261,7 +265,7 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             equals=equals, tells=f"{COURSES} and at several speeds",
         )  # fmt: skip
     yield Cause(
-        "sensor psi bias / with velocities", _turn_heading, (0.02,), "rad", 0.015,
+        "sensor psi bias / with velocities", rotate_heading, (0.02,), "rad", 0.015,
         repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
         equals=("asymmetry of hull or screw", "sensor v bias", "current"), tells=COURSES,
     )  # fmt: skip
@@ -273,16 +277,17 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
         yield Cause(
             f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.01, ratio=True, scaled=rows, starts=UNITS,
             repair=f'[[repair]]\nkind = "scale"\ncolumns = {[*names]}\nfactor = {{over0}}',
-            equals=same.get(key, ()), tells=SPEEDS,
+            equals=same.get(key, ()), tells=SPEEDS, cost=float(key == "u"),
         )  # fmt: skip
     for name in ("v", "r", "psi"):
         yield Cause(
-            f"sensor {name} sign", partial(_negate, name), repair=f"[columns.{name}]\nsign = -1  # times what is there"
+            f"sensor {name} sign", partial(multiply_signs, [name], -1.0),
+            repair=f"[columns.{name}]\nsign = -1  # times what is there",
         )  # fmt: skip
-    of_velocity, gyro = ("sensor velocity delay",), "name the column of a gyro or a compass as psi"
+    gyro = "name the column of a gyro or a compass as psi"
     late: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
-        "u": (("u",), "velocity", of_velocity),
-        "v": (("v",), "velocity", of_velocity),
+        "u": (("u",), "velocity", ("sensor velocity delay",)),
+        "v": (("v",), "velocity", ("sensor velocity delay",)),
         "r": (("r",), "yaw rate", ()),
         "psi": (("psi",), "heading", ()),
         "velocity": (VELOCITY, "velocity", ("sensor u delay", "sensor v delay")),
@@ -293,13 +298,16 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
             f"sensor {key} delay", partial(_advance, names), (max(0.03 * scales.passing, 0.25 * scales.interval),), "s",
             0.01 * scales.passing, starts=tuple(share * scales.passing for share in (*EARLY, *LATE)),
             repair=f'[[repair]]\nkind = "latency"\nsignal = "{kind}"\nseconds = {{0}}',
-            equals=equals, tells="turns to both sides",
+            equals=equals, tells="turns to both sides", cost=float(key in "uv"),
         )  # fmt: skip
     yield Cause("heading is course", _heading_from_course, repair=gyro)
     yield Cause(
         "heading is course / and drift is lost", _heading_about_pivot, (0.05 * scales.length,), "m", repair=gyro,
         starts=(0.4 * scales.length,), equals=("sensor v scale",),
     )  # fmt: skip
+    yield Cause(
+        "heading is course / and drift is that of the physics", lambda log, _: replace(log, course=True), repair=gyro
+    )
     arms = {"position": ("lever arm velocity", "sensor position delay"), "velocity": ("lever arm position",)}
     for moves, word in (("position", "position"), ("velocity", "velocity"), ("position and velocity", "both")):
         yield Cause(

@@ -34,12 +34,16 @@ estimated without a part of the runs (or of the time, where there is one run) an
 The causes of least misfit also predict paths of 5 ship lengths, whose errors count as a seventh equation. How far noise
 makes them err is seen on the log with its noise once more.
 
-- `none`: no cause lowers the misfit by more than `SURE` standard errors over blocks of time, or by `DECISIVE`; or those
-  that do so lower the error of the paths by less than a share `WORTH`; or that error is noise; or they are smaller than
-  what a log has anyhow (a command that is a row late).
+- `none`: no cause lowers the misfit by `DECISIVE` for each bump, or by more standard errors over blocks of time than
+  the best of so many causes has by chance (normal, with probability `LEVEL`: Bonferroni); or those that do so lower the
+  error of the paths by less than a share `WORTH` of that of the log as given; or that error is noise; or they are
+  smaller than what a log has anyhow (a command that is a row late).
+- A cause that lowers the misfit of the equations of heading and position by `PLAIN` for each bump needs neither:
+  kinematics hold for every ship, and paths may drown in noise.
 - Causes tie with that of least misfit where they are worse by less than `APART` standard errors, or the share `ALIKE`
   of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
   `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
+- Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
 - `current by run` gains only what is beyond an unknown force of each run, as gusts are.
 - A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
   naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
@@ -61,14 +65,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import least_squares
-from scipy.special import exprel
+from scipy.special import exprel, ndtri
 
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
 from shipid.engine.casadi import input_symbols, memory_along, summed_rates
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
-from shipid.identification.causes import Cause, Motion, Scales, list_causes
+from shipid.identification.causes import Cause, Motion, Scales, list_causes, multiply_signs, rotate_heading
 from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
@@ -92,18 +96,15 @@ ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_FORCES, WEIGHINGS = 20, 3  # evaluations of a fit of the forces alone with the same weights; such fits
 CALM = 1e-3  # of SMOOTH: the least smoothing where forces are fitted, which SMOOTH would bias without noise
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
-PLAIN = 0.1  # of a misfit for each bump: so much shows a cause where kinematics alone are judged
+PLAIN = 0.1  # of the misfit of kinematics for each bump: so much shows a cause, whatever physics says
 MOST_SIZES = 2  # that a sentence names
 HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
-SIGN, SIGN_STEPS, SIGN_ROUNDS = (
-    1.0,
-    4,
-    4,
-)  # by so much better must a shaft that turns astern explain a piece of a log, in bumps
-SURE, APART = 2.0, 2.0  # standard errors
+# pieces of a log over which it is seen whether a shaft turns astern; steps of a piece; rounds
+SIGN, SIGN_STEPS, SIGN_ROUNDS = 1.0, 4, 4
+LEVEL, APART = 0.05, 2.0  # probability that any cause is so good by chance; standard errors
 BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
-DECISIVE, ALIKE = 30.0, 0.3  # gain that needs no standard error; share of a gain that a runner-up may lack
+DECISIVE, ALIKE = 2.0, 0.3  # gain for each bump that needs no standard error; share of a gain that a runner-up may lack
 WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the paths; of a cause without a size, as a wrong sign
 STATES = ("u", "v", "r", "psi", "north", "east")
 
@@ -119,7 +120,7 @@ class Diagnosis:
         noise, that it explains.
     noise : mean error [m] of these paths by the noise of the log alone.
     next : the same of a second cause beside the first, if there is one; sizes are those beside each other.
-    misfits : key -> misfit on parts left out, less that of `none`; infinite where a cause is too small to matter.
+    misfits : key -> misfit on parts left out, less that of `none`.
     """
 
     cause: str
@@ -151,12 +152,17 @@ class _Fit:
     left_out: Array
     motion: Motion
 
+    @property
+    def counts(self) -> bool:
+        """Whether it is more than what any log has."""
+        return bool(np.linalg.norm(self.theta) >= self.cause.least)
+
 
 class _Log:
     """A log at equal steps with its bumps, and the residuals of any change of it by kinematics alone."""
 
     length: float | None = None
-    plain, calm = PLAIN, 1.0
+    calm = 1.0
     commands: tuple[str, ...] = ()
     environment: Mapping[str, float] = MappingProxyType({})
     numbers: tuple[float, ...] = ()
@@ -377,6 +383,11 @@ class _Log:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
         return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
 
+    def is_plain(self, fit: _Fit) -> bool:
+        """Whether kinematics alone show a cause."""
+        before, after = ((z[3:] ** 2).mean(axis=1) + self.noise[3:] ** 2 for z in (self.plain_residuals, fit.left_out))
+        return fit.counts and bool(np.log(before / after).sum() / 2 > PLAIN)
+
     def gain_of_forces(self, z: Array) -> float:
         """By how much an unknown force of each run, ahead and aside, lowers the misfit of z (6, W) and of paths.
 
@@ -409,7 +420,6 @@ class _VesselLog(_Log):
     """A log with the vessel that should have made it."""
 
     _kept: tuple[Array, Array] | None = None
-    plain = np.inf  # physics is never so right that a misfit alone would show what is wrong
 
     def __init__(
         self,
@@ -463,13 +473,37 @@ class _VesselLog(_Log):
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
+        return np.array(_mapped_rates(self.model, len(at))(*self._inputs(motion, at), motion.parameters))
+
+    def _inputs(self, motion: Motion, at: Steps) -> list[Array]:
+        """States, actuators, commands and environment, each (., n), at n steps."""
         columns = self.states(motion)
-        inputs = [self._start(columns, at), self.memory(motion)[:, at]]
-        inputs += [
+        given = (
             np.array([columns[name][at] for name in names]).reshape(-1, len(at))
             for names in (self.commands, self.environment)
-        ]
-        return np.array(_mapped_rates(self.model, len(at))(*inputs, motion.parameters))
+        )
+        return [self._start(columns, at), self.memory(motion)[:, at], *given]
+
+    def _with_drift(self, motion: Motion) -> Motion:
+        """The log with its heading, where that is a course: sway is that of the physics, from a while before on."""
+        if not motion.course:
+            return motion
+        speed = np.hypot(motion.columns["u"], motion.columns["v"])
+        sway, row = np.zeros(len(speed)), self.model.state.index("v")
+        states, *inputs = self._inputs(motion, np.arange(len(sway)))
+        parts = [(at, p.start, p.stop - 1) for p in motion.stretches for at in range(p.start, p.stop, SHORTEST)]
+        start, first, last = np.transpose(parts)
+        v, rates = np.zeros(len(start)), _mapped_rates(self.model, len(start))
+        for k in range(-SHORTEST, SHORTEST):
+            at = np.clip(start + k, first, last)
+            sway[at] = states[row, at] = v = np.clip(v, -speed[at], speed[at])
+            v = v + motion.step * np.array(rates(states[:, at], *(one[:, at] for one in inputs), motion.parameters))[1]
+        drift = np.arcsin(sway / np.maximum(speed, 1e-12)) * np.sign(motion.columns["u"])
+        return rotate_heading(replace(motion, course=False), [drift])
+
+    def residuals(self, motion: Motion) -> Array:
+        """Residuals (6, W): measured change less predicted change, a unit of time."""
+        return super().residuals(self._with_drift(motion))
 
     def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
         """States (., n) at n steps; those that no column has are 0."""
@@ -478,6 +512,7 @@ class _VesselLog(_Log):
 
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
+        motion = self._with_drift(motion)
         columns, at = self.states(motion), self.paths
         rows = at + np.arange(self.ahead + 1)[:, None]
         found = rollout_distances(
@@ -523,10 +558,6 @@ def _mapped_rates(model: Dynamics, count: int) -> ca.Function:
     return ca.Function("accelerations", inputs, [rates[rows]], {"cse": True}).map("mapped", "serial", count, [4], [])
 
 
-def _put_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
-    return motion.put({name: signs * motion.columns[name] for name in names})
-
-
 def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     """Shafts whose speed may lack its sign, each alone and all together.
 
@@ -541,18 +572,18 @@ def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
     shafts = [name for name, values in turning.items() if 0 <= values.min() < values.max()]
     for names in [*([name] for name in shafts), *([shafts] if len(shafts) > 1 else [])]:
         ahead, astern = (
-            (measured[:, every] - log.accelerations(_put_signs(names, sign, motion), every)[[0, 2]]) ** 2
+            (measured[:, every] - log.accelerations(multiply_signs(names, sign, motion), every)[[0, 2]]) ** 2
             for sign in (1, -1)
         )
         signs = np.ones(count)
         for _ in range(SIGN_ROUNDS):  # the clearest parts first: with them right, less is left to hide the others
-            weight = log.weights(log.residuals(_put_signs(names, signs, motion)))[[0, 2]]
+            weight = log.weights(log.residuals(multiply_signs(names, signs, motion)))[[0, 2]]
             less = gaussian_filter1d(weight**2 @ (ahead - astern), SIGN)
             signs = np.repeat(np.where(less > 0, -1.0, 1.0), SIGN_STEPS)[:count]
         if (signs < 0).any():
             yield Cause(
                 " ".join([f"command {names[0]} unsigned", *(["/ with", *names[1:]] if len(names) > 1 else [])]),
-                partial(_put_signs, names, signs),
+                partial(multiply_signs, names, signs),
                 repair=f"{' and '.join(names)} without a sign: give the column that says ahead or astern",
                 equals=tuple(f"command {name} unsigned" for name in shafts),
                 tells="the column that says ahead or astern",
@@ -634,10 +665,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
-    cost = {
-        key: np.inf if fit.cause.trial and np.linalg.norm(fit.theta) < fit.cause.least else fit.cause.cost
-        for key, fit in fits.items()
-    }
+    cost = {cause.key: cause.cost for cause in causes}
     cost |= {cause.key: cost[cause.key] + log.gain_of_forces(base) for cause in causes if cause.of_runs}
     misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
@@ -648,19 +676,20 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     before, missed = log.beyond_noise(plain[1]), float(plain[1].mean())
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
     left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
-    worth = {key: min(1 - x / before, 1 - x / whole, 1.5 * (before - x) / whole) for key, x in left.items()}
-    share, ahead = 1 - left[order[0]] / before, log.step * log.ahead
+    worth = {key: (min(before, whole) - x) / whole * fits[key].counts for key, x in left.items()}
+    share, ahead, decisive = 1 - left[order[0]] / before, log.step * log.ahead, DECISIVE * log.worth
     result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    if missed < log.blur or gain < min(SURE * error, DECISIVE):
+    by_chance = gain < min(-ndtri(LEVEL / len(causes)) * error, decisive)
+    if missed < log.blur or (by_chance and not log.is_plain(fits[order[0]])):
         return result, None
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
-    told = [
-        one for one in tied if worth[one.key] > (WORTH if one.trial else WORTH_DISCRETE) or gain > log.plain * log.worth
+    told = [one for one in tied if log.is_plain(fits[one.key])] or [
+        one for one in tied if worth[one.key] > (WORTH if one.trial else WORTH_DISCRETE)
     ]
     if not told:
-        return result, fits[order[0]] if gain > DECISIVE else None
+        return result, fits[order[0]] if gain > decisive else None
     cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
     result = replace(result, share=1 - left[cause.key] / before)
     if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):

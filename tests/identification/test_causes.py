@@ -48,7 +48,7 @@ def test_a_trial_step_is_felt_and_a_repair_holds_its_numbers(ship: str) -> None:
     for cause in causes:
         after = cause.change(motion, np.array(cause.trial))
         moved = [name for name, values in motion.columns.items() if not np.array_equal(after.columns[name], values)]
-        assert moved or not np.array_equal(after.parameters, motion.parameters), cause.key
+        assert moved or after.course or not np.array_equal(after.parameters, motion.parameters), cause.key
         assert "{" not in cause.repair_text(np.array(cause.trial)), cause.key
 
 

@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.identification.diagnosis import NONE, UNCLEAR, diagnose
 from shipid.vessel.load import load_vessel
-from tests.identification.faulty_logs import diagnose_log, draw_faulty_log, draw_ship
+from tests.identification.faulty_logs import diagnose_log, draw_faulty_log, draw_ship, judge_causes
 from tests.identification.trials import changed, noisy, trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -90,6 +90,20 @@ def test_a_sound_log_is_not_blamed(seed: int) -> None:
     found = diagnose(SHIP, log_of(seed))
     assert found.cause == NONE
     assert "no single cause" in found.sentence
+
+
+@pytest.mark.parametrize(("seed", "number"), [(50001, 19), (50001, 53), (50002, 115)])
+def test_the_luckiest_of_many_causes_is_not_blamed(seed: int, number: int, tmp_path: Path) -> None:
+    """Some cause is always two standard errors better, or much better in a few blocks of time."""
+    assert diagnose_log(draw_faulty_log(seed, number, draw_ship(number % 20, seed), 0), tmp_path) == ([], [])
+
+
+@pytest.mark.parametrize(("seed", "number", "cause"), [(50003, 54, "heading.course"), (50004, 46, "yaw.scale")])
+def test_a_fault_is_named_whose_paths_hardly_show_it(seed: int, number: int, cause: str, tmp_path: Path) -> None:
+    """A drift by wind, which the physics must say; a gyro whose noise moves the paths as much as its scale does."""
+    log = draw_faulty_log(seed, number, draw_ship(number % 20, seed), 1)
+    assert log.causes == (cause,)
+    assert judge_causes(log, *diagnose_log(log, tmp_path)) == "right"
 
 
 @pytest.mark.parametrize("key", ["sensor psi bias", "sensor r bias", "lever arm position"])
