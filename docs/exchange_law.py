@@ -11,7 +11,6 @@ import argparse
 import datetime
 import hashlib
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,17 +25,19 @@ from shipid.exchange.law import (
     LAW_FILE,
     RESPONSES,
     Hierarchy,
+    Response,
     feature_columns,
     fit_hierarchy,
     fit_law,
     response_rows,
     response_values,
     save_law,
+    ship_designs,
 )
 
 FORM = RESPONSES["H"]
 NEAREST = ("length", "froude")
-GAUSSIAN_ROWS = 1200  # of a Gaussian process: its price grows with the cube
+SEARCH_ROWS, GAUSSIAN_ROWS = 400, 1500  # of a Gaussian process: its price grows with the cube
 FIRST = 3  # amounts that are given before the others are foretold
 
 
@@ -51,37 +52,35 @@ def interval_of(part: Hierarchy, rows: pd.DataFrame, known: pd.DataFrame | None 
     return mean + middle, (high - low) / 2, np.array(np.nan)
 
 
-def left_out(cells: pd.DataFrame, column: str) -> Iterator[tuple[str, pd.DataFrame, pd.DataFrame]]:
-    """Each ship, or type: its name, the cells of the others and its own, with runs."""
-    for name in pd.unique(cells[column]):
-        mine = cells[column] == name
-        yield str(name), cells[~mine], response_rows(FORM, cells[mine])
-
-
 def score(error: np.ndarray, inside: np.ndarray) -> list[str]:
     """Of ln ratios (cells,): median factor, bias as a factor, and the share of cells inside."""
     return [f"{np.exp(np.median(np.abs(error))):.2f}", f"{np.exp(error.mean()):.2f}", f"{100 * inside.mean():.1f}"]
 
 
-def linear_form() -> object:
-    """The rival: the same effects, no floor beside them."""
-    return FORM._replace(floor=())
+class GaussianProcess:
+    """A Gaussian process over the numbers that the law has; its length scales are fitted once, to all ships."""
 
+    names = ("n", "a", "p", "h", "none", "froude", "size", *FLAWS)
 
-def gaussian_process(train: pd.DataFrame, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and half of the 95 % interval of a Gaussian process over the numbers that the law has."""
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    def __init__(self, cells: pd.DataFrame) -> None:
+        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-    names = ["n", "a", "p", "h", "none", "froude", "size", *FLAWS]
-    train = response_rows(FORM, train)
-    train = train.sample(min(GAUSSIAN_ROWS, len(train)), random_state=0)
-    inputs, asked = feature_columns(train, names), feature_columns(rows, names)
-    values = response_values(FORM, train)
-    kernel = ConstantKernel() * RBF(np.ones(len(names)), (0.1, 1e3)) + WhiteKernel(0.05)
-    process = GaussianProcessRegressor(kernel, normalize_y=True).fit(inputs, values)
-    mean, spread = process.predict(asked, return_std=True)
-    return mean, 1.96 * spread
+        kernel = ConstantKernel() * RBF(np.ones(len(self.names)), (0.1, 1e3)) + WhiteKernel(0.05)
+        self.kernel = self._fit(cells, SEARCH_ROWS, kernel=kernel).kernel_
+
+    def _fit(self, cells: pd.DataFrame, most: int, **options: object) -> object:
+        from sklearn.gaussian_process import GaussianProcessRegressor
+
+        rows = response_rows(FORM, cells)
+        rows = rows.sample(min(most, len(rows)), random_state=0)
+        process = GaussianProcessRegressor(normalize_y=True, **options)
+        return process.fit(feature_columns(rows, self.names), response_values(FORM, rows))
+
+    def foretell(self, others: pd.DataFrame, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and half of the 95 % interval (rows,) of ln(H / baseline), from the cells of other ships."""
+        process = self._fit(others, GAUSSIAN_ROWS, kernel=self.kernel, optimizer=None)
+        mean, spread = process.predict(feature_columns(rows, self.names), return_std=True)
+        return mean, 1.96 * spread
 
 
 def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
@@ -96,49 +95,52 @@ def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
     return values[[int((((known - one) * weights) ** 2).sum(axis=1).argmin()) for one in asked]]
 
 
-def judge(cells: pd.DataFrame, start: dict[str, Hierarchy]) -> None:
+def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
     """Print how well ships and types that were left out are foretold, by the law and its rivals."""
+    linear, rows_of = FORM._replace(floor=()), dict(tuple(response_rows(FORM, cells).groupby("ship", sort=False)))
+    designs = {form: ship_designs(form, cells) for form in (FORM, linear)}
+    starts = {FORM: part, linear: fit_hierarchy(linear, [*designs[linear].values()])}
     scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
-    rows_of_ships, biases = [], []
-    for column in ("ship", "type"):
-        for name, others, mine in left_out(cells, column):
-            part = fit_hierarchy(FORM, others, start["law"], 5)
-            for ship, rows in mine.groupby("ship"):
-                value = response_values(FORM, rows)
-                mean, half, of_mean = interval_of(part, rows)
-                error = value - mean
-                scores.setdefault(f"law, {column} left out", []).append((error, np.abs(error) <= half))
-                if column == "type":
-                    continue
-                inside = abs(error.mean()) <= of_mean
-                biases.append(inside)
-                rows_of_ships.append([str(ship), str(rows["type"].iloc[0]), f"{rows['length'].iloc[0]:.3g}",
-                                      *score(error, np.abs(error) <= half), "yes" if inside else "no"])  # fmt: skip
-                line = fit_hierarchy(linear_form(), others, start["linear"], 5)
-                mean, half, _ = interval_of(line, rows)
-                scores.setdefault("mixed model without a floor", []).append(
-                    (value - mean, np.abs(value - mean) <= half)
-                )
-                mean, half = gaussian_process(others, rows)
-                scores.setdefault("Gaussian process", []).append((value - mean, np.abs(value - mean) <= half))
-                error = value - nearest_curve(others, rows)
-                scores.setdefault("curve of the nearest ship", []).append((error, np.full(len(error), np.nan)))
-                amounts = sorted(rows["N_D"].unique())
-                known, later = rows[rows["N_D"].isin(amounts[:FIRST])], rows[rows["N_D"].isin(amounts[FIRST:])]
-                mean, half, _ = interval_of(part, later, known)
-                error = response_values(FORM, later) - mean
-                scores.setdefault("law, first three amounts given", []).append((error, np.abs(error) <= half))
-                _ = name
-    print("| foretold | median factor | bias | ships' median bias | inside 95 % |\n| --- | ---: | ---: | ---: | ---: |")
+    table, inside_biases, process = [], [], GaussianProcess(cells)
+
+    def fit_without(form: Response, absent: set[str]) -> Hierarchy:
+        return fit_hierarchy(form, [one for name, one in designs[form].items() if name not in absent], starts[form], 3)
+
+    def note(name: str, error: np.ndarray, half: np.ndarray) -> None:
+        scores.setdefault(name, []).append((error, np.where(np.isnan(half), np.nan, np.abs(error) <= half)))
+
+    for ship, rows in rows_of.items():
+        value, one, others = response_values(FORM, rows), fit_without(FORM, {ship}), cells[cells["ship"] != ship]
+        mean, half, of_mean = interval_of(one, rows)
+        error = value - mean
+        note("law, each ship left out", error, half)
+        inside_biases.append(abs(error.mean()) <= of_mean)
+        table.append([ship, str(rows["type"].iloc[0]), f"{rows['length'].iloc[0]:.3g}",
+                      *score(error, np.abs(error) <= half), "yes" if inside_biases[-1] else "no"])  # fmt: skip
+        mean, half, _ = interval_of(fit_without(linear, {ship}), rows)
+        note("mixed model without a floor", value - mean, half)
+        mean, half = process.foretell(others, rows)
+        note("Gaussian process", value - mean, half)
+        note("curve of the nearest ship", value - nearest_curve(others, rows), np.full(len(rows), np.nan))
+        first = rows["N_D"].isin(sorted(rows["N_D"].unique())[:FIRST])
+        mean, half, _ = interval_of(one, rows[~first], rows[first])
+        note("law, first three amounts given", value[~first] - mean, half)
+    for _, group in cells.groupby("type"):
+        absent = {*group["ship"]}
+        one = fit_without(FORM, absent)
+        for ship in absent & {*rows_of}:
+            mean, half, _ = interval_of(one, rows_of[ship])
+            note("law, each type left out", response_values(FORM, rows_of[ship]) - mean, half)
+    print("| foretold | median factor | bias | median bias of a ship | inside 95 % |")
+    print("| --- | ---: | ---: | ---: | ---: |")
     for name, parts in scores.items():
-        error, inside = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        factor, bias, held = score(*(np.concatenate([part[k] for part in parts]) for k in (0, 1)))
         typical = np.exp(np.median([abs(part[0].mean()) for part in parts]))
-        factor, bias, held = score(error, inside)
         print(f"| {name} | {factor} | {bias} | {typical:.2f} | {held} |")
-    print(f"\nThe bias of a ship lies inside its interval for {sum(biases)} of {len(biases)} ships.\n")
+    print(f"\nThe bias of a ship lies inside its interval for {sum(inside_biases)} of {len(inside_biases)} ships.\n")
     print("| ship left out | type | length [m] | median factor | bias | inside 95 % | bias inside |")
     print("| --- | --- | ---: | ---: | ---: | ---: | --- |")
-    for row in rows_of_ships:
+    for row in table:
         print(f"| {' | '.join(row)} |")
 
 
@@ -191,7 +193,7 @@ def main() -> None:
         print(f"| {level} | {feature} | {np.sqrt(variance):.3f} |")
     print_kinds(part)
     print()
-    judge(cells, {"law": part, "linear": fit_hierarchy(linear_form(), cells)})
+    judge(cells, part)
 
 
 if __name__ == "__main__":

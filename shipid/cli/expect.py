@@ -61,7 +61,7 @@ def expect_command(
             ship = UnseenShip(length, speed, sea=sea)
     table = expect.expected_errors(exchange, ship, foundations, amounts, ahead)
     with open_answer(as_json) as answer:
-        sentence = expect.expectation_sentence(table.iloc[len(amounts) // 2], ship, ahead)
+        sentence = expect.expectation_sentence(table.iloc[0 if runs else len(amounts) // 2], ship, ahead)
         answer.say(sentence, sentence=sentence)
         answer.warn(expect.extrapolation_sentences(exchange, ship, foundations, amounts, ahead))
         answer.records("expected", table, HEADS)

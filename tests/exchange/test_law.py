@@ -19,6 +19,7 @@ from shipid.exchange.law import (
     response_rows,
     response_values,
     save_law,
+    ship_designs,
 )
 from tests.exchange.drawn_cells import TRUE_SPREAD, TRUE_THETA, draw_cells, true_law
 
@@ -85,7 +86,7 @@ def test_units_and_the_order_of_rows_do_not_matter(law, cells):
     metres = ["A", "H", "baseline", "floor", "length"]
     other = cells.sample(frac=1, random_state=3)
     other[metres] *= 10.0
-    other = fit_hierarchy(RESPONSES["H"], other)
+    other = fit_hierarchy(RESPONSES["H"], [*ship_designs(RESPONSES["H"], other).values()])
     assert other.theta == pytest.approx(law.parts["H"].theta, abs=1e-6)
 
 
