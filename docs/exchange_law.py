@@ -18,12 +18,14 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from shipid import __version__
+from shipid import __version__, read_results
 from shipid.exchange.cells import read_cell_table
+from shipid.exchange.expect import study_cells
 from shipid.exchange.law import (
     FLAWS,
     LAW_FILE,
     RESPONSES,
+    ExchangeLaw,
     Hierarchy,
     Response,
     feature_columns,
@@ -37,7 +39,7 @@ from shipid.exchange.law import (
 
 FORM = RESPONSES["H"]
 NEAREST = ("length", "froude")
-SEARCH_ROWS, GAUSSIAN_ROWS = 400, 1500  # of a Gaussian process: its price grows with the cube
+SEARCH_ROWS, GAUSSIAN_ROWS = 400, 1000  # of a Gaussian process: its price grows with the cube
 FIRST = 3  # amounts that are given before the others are foretold
 
 
@@ -104,7 +106,7 @@ def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
     table, inside_biases, process = [], [], GaussianProcess(cells)
 
     def fit_without(form: Response, absent: set[str]) -> Hierarchy:
-        return fit_hierarchy(form, [one for name, one in designs[form].items() if name not in absent], starts[form], 3)
+        return fit_hierarchy(form, [one for name, one in designs[form].items() if name not in absent], starts[form], 2)
 
     def note(name: str, error: np.ndarray, half: np.ndarray) -> None:
         scores.setdefault(name, []).append((error, np.where(np.isnan(half), np.nan, np.abs(error) <= half)))
@@ -145,20 +147,45 @@ def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
 
 
 def print_kinds(part: Hierarchy) -> None:
-    """Print how much larger H is at equal A for each kind of error, against the mean of four kinds, with 95 %."""
-    four = ("damping", "mass", "thrust", "missing")
-    print("\n| what is wrong | 2 runs | 8 runs | 32 runs |\n| --- | ---: | ---: | ---: |")
-    for kind in FLAWS:
-        texts = []
-        for runs in (2, 8, 32):
-            weights = np.zeros(len(part.theta))
-            for name, weight in [(kind, 1.0), *((one, -1 / len(four)) for one in four)]:
-                weights[FORM.features.index(name)] += weight
-                weights[FORM.features.index(f"{name}:n")] += weight * np.log(runs / 8)
-            value, error = weights @ part.theta, np.sqrt(weights @ part.covariance @ weights)
-            low, high = value - 1.96 * error, value + 1.96 * error
-            texts.append(f"{np.exp(value):.2f} [{np.exp(low):.2f}, {np.exp(high):.2f}]")
-        print(f"| {kind} | {' | '.join(texts)} |")
+    """Print H for each kind of error over the mean of four kinds, where A is the baseline and the floor a third of it.
+
+    Two ship lengths ahead; 95 % intervals over ships.
+    """
+    print(
+        "\nH for each kind over the mean of damping, mass, thrust and missing, at equal A (the baseline), 2 lengths:\n"
+    )
+    print("| what is wrong | 2 runs | 8 runs | 32 runs |\n| --- | ---: | ---: | ---: |")
+    same = {"A": 1.0, "baseline": 1.0, "floor": 1 / 3, "ahead": 2.0, "froude": 0.2, "length": 50.0}
+    texts: dict[str, list[str]] = {kind: [] for kind in FLAWS}
+    for runs in (2, 8, 32):
+        mean, jacobian = part.mean(pd.DataFrame([{"kind": kind, "N_D": runs, **same} for kind in FLAWS]))
+        four = [FLAWS.index(kind) for kind in ("damping", "mass", "thrust", "missing")]
+        mean, jacobian = mean - mean[four].mean(), jacobian - jacobian[four].mean(axis=0)
+        errors = 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", jacobian, part.covariance, jacobian))
+        for kind, value, error in zip(FLAWS, mean, errors, strict=True):
+            texts[kind].append("{:.2f} [{:.2f}, {:.2f}]".format(*np.exp([value, value - error, value + error])))
+    for kind, row in texts.items():
+        print(f"| {kind} | {' | '.join(row)} |")
+
+
+def print_unseen(law: ExchangeLaw, folders: list[Path]) -> None:
+    """Print H of recorded ships, which taught the law nothing, beside what it expects of their A and baseline."""
+    print("\n| recorded | physics | A [m] | runs | H [m] | expected | 95 % | inside |")
+    print("| --- | --- | ---: | ---: | ---: | ---: | --- | --- |")
+    inside = []
+    for folder in folders:
+        cells, ship = study_cells(read_results(folder))
+        for name, rows in cells.groupby("foundation", sort=False):
+            kind, error = rows[["kind", "A"]].iloc[0]
+            physics = error if kind == "" else (kind, error)
+            draws = law.expect(ship, physics, [*rows["N_D"]], float(rows["ahead"].iloc[0]), 1000)
+            for row, (low, middle, high) in zip(
+                rows.to_dict("records"), np.quantile(draws, [0.025, 0.5, 0.975], axis=0).T, strict=True
+            ):
+                inside.append(low <= row["H"] <= high)
+                words = f"{row['H']:.3g} | {middle:.2g} | {low:.2g} to {high:.2g} | {'yes' if inside[-1] else 'no'}"
+                print(f"| {folder.name} | {name} | {error:.3g} | {row['N_D']} | {words} |")
+    print(f"\nInside: {sum(inside)} of {len(inside)}.")
 
 
 def main() -> None:
@@ -166,6 +193,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cells", type=Path)
     parser.add_argument("--write", action="store_true", help="write the law that comes with shipid")
+    parser.add_argument("--unseen", type=Path, nargs="*", help="folders of studies of recorded ships")
     given = parser.parse_args()
     warnings.filterwarnings("ignore", module="sklearn")
     cells = read_cell_table(given.cells)
@@ -192,7 +220,9 @@ def main() -> None:
     for (level, feature), variance in zip(FORM.levels, part.variances, strict=True):
         print(f"| {level} | {feature} | {np.sqrt(variance):.3f} |")
     print_kinds(part)
-    print()
+    if given.unseen:
+        print_unseen(law, given.unseen)
+    print(flush=True)
     judge(cells, part)
 
 

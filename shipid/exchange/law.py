@@ -28,7 +28,6 @@ Array = np.ndarray
 Physics = str | float | tuple[str, float]
 """A kind of physics of `CELL_KINDS` or `LIKELY`, its A [m], or both."""
 LAW_FILE = Path(__file__).with_name("law.json")
-LAW_DIGITS = 8  # of numbers in the file: rounding moves a prediction by less than 1e-5
 
 
 class Response(NamedTuple):
@@ -491,16 +490,11 @@ def save_law(law: ExchangeLaw, file: Path) -> None:
             "features": list(part.response.features),
             "levels": [" : ".join(level) for level in part.response.levels],
         }
-        | {key: _round_numbers(getattr(part, key)) for key in ("theta", "covariance", "variances")}
+        | {key: getattr(part, key) for key in ("theta", "covariance", "variances")}
         | {"ships": part.ships}
         for name, part in law.parts.items()
     }
     write_json(file, {"parts": parts, "limits": law.limits, "provenance": law.provenance})
-
-
-def _round_numbers(values: Array) -> list[Any]:
-    """Numbers of an array, rounded, as nested lists."""
-    return [_round_numbers(one) if np.ndim(one) else float(f"{one:.{LAW_DIGITS}g}") for one in values]
 
 
 def read_law(file: Path = LAW_FILE) -> ExchangeLaw:

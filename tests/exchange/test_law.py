@@ -98,7 +98,7 @@ def covered(draws, true, level):
 @pytest.mark.parametrize("known", [0, 3], ids=["before any run", "after three amounts"])
 def test_intervals_hold_on_ships_that_it_has_not_seen(law, known):
     shares = []
-    for _, ship in draw_cells(24, 2, KINDS).groupby("ship"):
+    for _, ship in draw_cells(14, 2, KINDS).groupby("ship"):
         rows = ship[ship["ahead"] == 2.0].sort_values(["foundation", "N_D"])
         amounts = sorted(set(rows["N_D"]))
         asked = UnseenShip(*rows[["length", "speed", "baseline", "floor"]].iloc[0])
