@@ -103,12 +103,15 @@ def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
     designs = {form: ship_designs(form, cells) for form in (FORM, linear)}
     starts = {FORM: part, linear: fit_hierarchy(linear, [*designs[linear].values()])}
     scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    gains: dict[str, list[np.ndarray]] = {}  # log scores, larger is better, less a constant
     table, inside_biases, process = [], [], GaussianProcess(cells)
 
     def fit_without(form: Response, absent: set[str]) -> Hierarchy:
         return fit_hierarchy(form, [one for name, one in designs[form].items() if name not in absent], starts[form], 2)
 
     def note(name: str, error: np.ndarray, half: np.ndarray) -> None:
+        spread = half / 1.96
+        gains.setdefault(name, []).append(-np.log(spread) - (error / spread) ** 2 / 2)
         scores.setdefault(name, []).append((error, np.where(np.isnan(half), np.nan, np.abs(error) <= half)))
 
     for ship, rows in rows_of.items():
@@ -133,12 +136,12 @@ def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
         for ship in absent & {*rows_of}:
             mean, half, _ = interval_of(one, rows_of[ship])
             note("law, each type left out", response_values(FORM, rows_of[ship]) - mean, half)
-    print("| foretold | median factor | bias | median bias of a ship | inside 95 % |")
-    print("| --- | ---: | ---: | ---: | ---: |")
+    print("| foretold | median factor | bias | median bias of a ship | inside 95 % | log score |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: |")
     for name, parts in scores.items():
         factor, bias, held = score(*(np.concatenate([part[k] for part in parts]) for k in (0, 1)))
         typical = np.exp(np.median([abs(part[0].mean()) for part in parts]))
-        print(f"| {name} | {factor} | {bias} | {typical:.2f} | {held} |")
+        print(f"| {name} | {factor} | {bias} | {typical:.2f} | {held} | {np.concatenate(gains[name]).mean():.2f} |")
     print(f"\nThe bias of a ship lies inside its interval for {sum(inside_biases)} of {len(inside_biases)} ships.\n")
     print("| ship left out | type | length [m] | median factor | bias | inside 95 % | bias inside |")
     print("| --- | --- | ---: | ---: | ---: | ---: | --- |")

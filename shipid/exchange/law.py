@@ -59,9 +59,11 @@ RESPONSES = {
         "baseline",
         ("1", "n", "a", "a:n", "h", "h:n", "none", "none:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
         (
-            *((SHIP, feature) for feature in ("1", "n", "a", "h")),
-            *((level, feature) for level in (KIND, FOUNDATION) for feature in ("1", "n")),
-            *((level, feature) for level in (RUNS, CELL) for feature in ("1", "few")),
+            *((SHIP, feature) for feature in ("1", "n", "a:few", "h", "none:few")),
+            (KIND, "few"),
+            *((FOUNDATION, feature) for feature in ("1", "few")),
+            (RUNS, "few"),
+            *((CELL, feature) for feature in ("1", "few")),
             (ROW, "1"),
         ),
         ("1", "p", "n", "h"),
@@ -400,6 +402,8 @@ class ExchangeLaw:
         for name in ("baseline", "floor", "A"):
             unknown = cells[name].isna() & (cells["kind"] != "none" if name == "A" else True)
             values = self._draw(name, cells[unknown], many[np.tile(unknown, draws)], draws, rng, sea=ship.sea)
+            if name == "floor":  # no physics is better than the true one
+                values = np.fmin(values, cells["A"].min())
             many.loc[np.tile(unknown, draws), name] = values.ravel()
             cells.loc[unknown, name] = np.median(values, axis=0)
         for one in (cells, many):  # of what the physics adds to the floor, some have a share
@@ -442,7 +446,8 @@ class ExchangeLaw:
         unknown = own["floor"].isna()
         if unknown.any():
             mean = self.parts["floor"].mean(own.assign(floor=own["baseline"]))[0]
-            own["floor"] = own["floor"].fillna(own["baseline"] * np.exp(mean))
+            least = own.groupby("ahead")["A"].transform("min")
+            own["floor"] = own["floor"].fillna(np.fmin(own["baseline"] * np.exp(mean), least))
         return own
 
 

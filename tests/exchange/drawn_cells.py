@@ -15,7 +15,7 @@ TRUE_THETA = {
     "1": -1.5, "n": -0.4, "a": 0.8, "a:n": -0.1, "h": 0.1, "none": -0.1, "none:n": -0.1, "damping": 0.2, "mass": -0.2,
 }  # fmt: skip
 TRUE_SPREAD = {
-    ("ship", "1"): 0.2, ("ship", "n"): 0.08, ("ship foundation", "1"): 0.1, ("ship N_D", "1"): 0.1,
+    ("ship", "1"): 0.2, ("ship", "n"): 0.08, ("ship foundation", "1"): 0.1, ("ship N_D", "few"): 0.2,
     ("ship foundation N_D", "1"): 0.1, ("ship foundation N_D ahead", "1"): 0.05,
 }  # fmt: skip
 

@@ -142,6 +142,12 @@ def test_a_rougher_sea_has_a_higher_floor(law):
     assert (np.diff(middle, axis=0) > 0).all()
 
 
+def test_an_accurate_physics_tells_of_a_low_floor(law):
+    asked = UnseenShip(100.0, 7.0, baseline=50.0)
+    alone, beside = (law.expect_all(asked, kinds, [64], 2.0, 1000)[:, 0, 0] for kinds in (["high"], ["high", 1.0]))
+    assert np.median(beside) < 0.7 * np.median(alone)
+
+
 def test_a_law_is_written_and_read(law, tmp_path):
     save_law(law, tmp_path / "law.json")
     asked, other = UnseenShip(100.0, 7.0), read_law(tmp_path / "law.json")
