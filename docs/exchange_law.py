@@ -175,9 +175,12 @@ def print_unseen(law: ExchangeLaw, folders: list[Path]) -> None:
     """Print H of recorded ships, which taught the law nothing, beside what it expects of their A and baseline."""
     print("\n| recorded | physics | A [m] | runs | H [m] | expected | 95 % | inside |")
     print("| --- | --- | ---: | ---: | ---: | ---: | --- | --- |")
-    inside = []
+    totals = []
     for folder in folders:
-        cells, ship = study_cells(read_results(folder))
+        inside = []
+        results = read_results(folder)
+        cells, ship = study_cells(results)
+        cells = cells[~cells["family"].isin(results.saw_test)]
         for name, rows in cells.groupby("foundation", sort=False):
             kind, error = rows[["kind", "A"]].iloc[0]
             physics = error if kind == "" else (kind, error)
@@ -188,7 +191,8 @@ def print_unseen(law: ExchangeLaw, folders: list[Path]) -> None:
                 inside.append(low <= row["H"] <= high)
                 words = f"{row['H']:.3g} | {middle:.2g} | {low:.2g} to {high:.2g} | {'yes' if inside[-1] else 'no'}"
                 print(f"| {folder.name} | {name} | {error:.3g} | {row['N_D']} | {words} |")
-    print(f"\nInside: {sum(inside)} of {len(inside)}.")
+        totals.append(f"{folder.name}, inside: {sum(inside)} of {len(inside)}")
+    print("\n" + "\n".join(totals))
 
 
 def main() -> None:
