@@ -1,8 +1,8 @@
 """The law of exchange: fitted, and judged on ships and on types of ships that it has not seen.
 
 `python docs/exchange_law.py CELLS --write` fits the law to a table of cells and writes the file that comes with shipid;
-without `--write` it judges: `python docs/records.py exchange-law python docs/exchange_law.py CELLS`. Every ship, and
-every type, is left out in turn: the law is fitted anew to the others.
+`--figure` draws its picture. Without them it judges: `python docs/records.py exchange-law python docs/exchange_law.py
+CELLS`. Every ship, and every type, is left out in turn: the law is fitted anew to the others.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
+from pictures import IMAGES, svg
 from scipy.stats import t as student
 
 from shipid import __version__, read_results
@@ -24,6 +26,7 @@ from shipid.exchange.expect import study_cells
 from shipid.exchange.law import (
     FLAWS,
     LAW_FILE,
+    NO_PHYSICS,
     RESPONSES,
     ExchangeLaw,
     Hierarchy,
@@ -99,7 +102,10 @@ def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
 
 def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
     """Print how well ships and types that were left out are foretold, by the law and its rivals."""
-    linear, rows_of = FORM._replace(floor=()), dict(tuple(response_rows(FORM, cells).groupby("ship", sort=False)))
+    linear, rows_of = (
+        FORM._replace(features=(*FORM.features, "p", "p:n", *NO_PHYSICS), floor=()),
+        dict(tuple(response_rows(FORM, cells).groupby("ship", sort=False))),
+    )
     designs = {form: ship_designs(form, cells) for form in (FORM, linear)}
     starts = {FORM: part, linear: fit_hierarchy(linear, [*designs[linear].values()])}
     scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
@@ -195,12 +201,38 @@ def print_unseen(law: ExchangeLaw, folders: list[Path]) -> None:
     print("\n" + "\n".join(totals))
 
 
+def law_figure(cells: pd.DataFrame, part: Hierarchy) -> go.Figure:
+    """H over the baseline against runs, 2 ship lengths ahead: each ship, and the law at the median A and floor."""
+    figure, inks = go.Figure(), {"nominal": "#2a7", "moderate": "#27c", "template": "#c72", "none": "#777"}
+    rows = response_rows(FORM, cells[(cells["ahead"] == 2.0) & cells["kind"].isin(inks)])
+    rows = rows.assign(
+        share=rows["H"] / rows["baseline"], A=rows["A"] / rows["baseline"], floor=rows["floor"] / rows["baseline"]
+    )
+    for kind, mine in rows.groupby("kind"):
+        place = mine["N_D"] * 1.04 ** (list(inks).index(str(kind)) - 1.5)
+        dots = {"color": inks[str(kind)], "size": 4, "opacity": 0.4}
+        figure.add_scatter(x=place, y=mine["share"], mode="markers", marker=dots, showlegend=False)
+        amounts = np.geomspace(1, 64, 30)
+        same = {"kind": kind, "A": mine["A"].median(), "floor": mine["floor"].median(), "baseline": 1.0, "ahead": 2.0}
+        line = pd.DataFrame({"N_D": amounts, **same, "length": 50.0, "froude": 0.2})
+        figure.add_scatter(
+            x=amounts, y=np.exp(part.mean(line)[0]), name=str(kind), line={"color": inks[str(kind)], "width": 3}
+        )
+    figure.update_xaxes(type="log", title="runs", tickvals=[1, 2, 4, 8, 16, 32, 64])
+    figure.update_yaxes(type="log", title="H / error of constant u, v, r", range=[-1.2, 0.8])
+    words = "Dots: ships. Lines: the law at the median A and floor of the kind."
+    return figure.update_layout(
+        template="plotly_white", title=f"Two ship lengths ahead<br><sup>{words}</sup>", width=760
+    )
+
+
 def main() -> None:
     """Fit the law and write it, or judge it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cells", type=Path)
     parser.add_argument("--write", action="store_true", help="write the law that comes with shipid")
     parser.add_argument("--unseen", type=Path, nargs="*", help="folders of studies of recorded ships")
+    parser.add_argument("--figure", action="store_true", help="draw the picture of the page")
     given = parser.parse_args()
     warnings.filterwarnings("ignore", module="sklearn")
     cells = read_cell_table(given.cells)
@@ -214,6 +246,9 @@ def main() -> None:
         save_law(replace(law, provenance=provenance), LAW_FILE)
         return
     part = law.parts["H"]
+    if given.figure:
+        (IMAGES / "exchange-law.svg").write_text(svg(law_figure(cells, part)), encoding="utf-8")
+        return
     print(f"{provenance['cells']} cells of {provenance['ships']} ships, digest {digest}\n")
     print("| feature | theta | error |\n| --- | ---: | ---: |")
     for name, value, error in zip(

@@ -53,11 +53,13 @@ SHIP, KIND, FOUNDATION, RUNS, CELL, ROW = (
     "ship foundation N_D ahead",
 )
 FLAWS = tuple(kind for kind in CELL_KINDS if kind not in ("none", "nominal"))
+NO_PHYSICS = ("none", "none:n", "none:few", "none:h", "none:p")
+"""Features of no physics: all of its error is in the second part, as it has no A."""
 RESPONSES = {
     "H": Response(
         "H",
         "baseline",
-        ("1", "n", "a", "a:n", "h", "h:n", "none", "none:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
+        ("1", "n", "a", "a:n", "h", "h:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
         (
             *((SHIP, feature) for feature in ("1", "n", "a:few", "h", "none:few")),
             (KIND, "few"),
@@ -66,7 +68,7 @@ RESPONSES = {
             *((CELL, feature) for feature in ("1", "few")),
             (ROW, "1"),
         ),
-        ("1", "p", "n", "h"),
+        ("1", "p", "n", "h", *NO_PHYSICS),
     ),
     "A": Response(
         "A",
@@ -295,7 +297,7 @@ def prior_of(response: Response) -> tuple[Array, Array]:
     widths = [NARROW if name.split(":")[0] in FLAWS and response.floor else WIDE for name in response.features]
     centre = [CENTRE.get(name, 0.0) * bool(response.floor) for name in response.features]
     centre += [FLOOR_CENTRE.get(name, 0.0) for name in response.floor]
-    return np.array(centre), np.array(widths + [1.0] * len(response.floor))
+    return np.array(centre), np.array(widths + [WIDE if name in NO_PHYSICS else 1.0 for name in response.floor])
 
 
 def _improve(
