@@ -1,0 +1,520 @@
+"""The law of exchange: H over the error of the physics, runs and horizon, by a hierarchical fit over ships.
+
+Every error is taken in units of the baseline, the error of constant u, v, r on the same windows. With n = ln(N_D / 8),
+a = ln(A / baseline), p = ln(floor / baseline), h = ln(ahead / 2):
+
+    ln(H / baseline) = ln(sqrt(R^2 + F^2)) + effects + rest,    R = exp(theta . features),    F = exp(c + p)
+
+R is what data can reduce, F the floor of sea and sensors. Effects of a ship, of a kind of physics on a ship, of a
+foundation and of the runs drawn are Gaussian with variances that the cells tell (`fit_hierarchy`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from shipid.errors import ResultError, ShipidError
+from shipid.exchange.cells import CELL_KINDS, check_cells
+from shipid.files import read_json, write_json
+from shipid.units import GRAVITY
+
+Array = np.ndarray
+Physics = str | float | tuple[str, float]
+"""A kind of physics of `CELL_KINDS` or `LIKELY`, its A [m], or both."""
+LAW_FILE = Path(__file__).with_name("law.json")
+
+
+class Response(NamedTuple):
+    """What a hierarchy predicts: ln(value / unit), with its features and the levels of its effects.
+
+    levels : (columns that make a group, feature of its effect); the last one is that of a row. floor : features of
+    the logarithm of what adds in squares, if anything does.
+    """
+
+    value: str
+    unit: str
+    features: tuple[str, ...]
+    levels: tuple[tuple[str, str], ...]
+    floor: tuple[str, ...] = ()
+
+
+SHIP, KIND, FOUNDATION, RUNS, CELL, ROW = (
+    "ship",
+    "ship kind",
+    "ship foundation",
+    "ship N_D",
+    "ship foundation N_D",
+    "ship foundation N_D ahead",
+)
+FLAWS = tuple(kind for kind in CELL_KINDS if kind not in ("none", "nominal"))
+NO_PHYSICS = ("none", "none:n", "none:few", "none:h", "none:p")
+"""Features of no physics: all of its error is in the second part, as it has no A."""
+RESPONSES = {
+    "H": Response(
+        "H",
+        "baseline",
+        ("1", "n", "a", "a:n", "h", "h:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
+        (
+            *((SHIP, feature) for feature in ("1", "n", "a:few", "h", "none:few")),
+            (KIND, "few"),
+            *((FOUNDATION, feature) for feature in ("1", "few")),
+            (RUNS, "few"),
+            *((CELL, feature) for feature in ("1", "few")),
+            (ROW, "1"),
+        ),
+        ("1", "p", "n", "h", *NO_PHYSICS),
+    ),
+    "A": Response(
+        "A",
+        "baseline",
+        ("h", "p", "nominal", *FLAWS),
+        ((SHIP, "1"), (SHIP, "h"), (KIND, "1"), (FOUNDATION, "1"), ("ship foundation ahead", "1")),
+    ),
+    "floor": Response(
+        "floor", "baseline", ("1", "h", "froude", "size"), ((SHIP, "1"), (SHIP, "h"), ("ship ahead", "1"))
+    ),
+    "baseline": Response(
+        "baseline", "length", ("1", "h", "froude", "size"), ((SHIP, "1"), (SHIP, "h"), ("ship ahead", "1"))
+    ),
+}
+LIKELY = {"model-test": ("moderate", 1 / 3), "identified": ("moderate", 1 / 5)}
+"""Physics that the ships of the law do not have -> the kind whose reducible error it has a share of.
+
+A factor uniform in 0.4-1.6 has a standard deviation of 35 %. Derivatives of captive tests are uncertain by some 10 %
+(ITTC 7.5-02-06-04); those that are identified from free runs are taken to be half as far off as they.
+"""
+SEAS = ("calm", "ordinary", "rough")
+ASKED = "asked"  # name of the ship that the law is asked about
+ANY = "any"  # kind of a physics of which A is all that is known: each draw has another one
+LIMITED = ("length", "froude", "N_D", "ahead", "A")
+CENTRE, FLOOR_CENTRE = {"1": -2.0, "a": 1.0, "n": -0.4}, {"1": -0.5, "p": 1.0}
+"""Means of the priors of H that are not 0: a share of A, falling with runs, beside a share of the floor."""
+MOST_STEP = 0.5  # of theta in one round
+WIDE, NARROW = 3.0, 0.3  # standard deviations of the Gaussian priors of features, and of those of a kind
+
+
+def feature_columns(cells: pd.DataFrame, names: Sequence[str]) -> Array:
+    """Return the features (rows, names) of cells; `a:n` is a product."""
+    base = cells["baseline"].to_numpy(float)
+    formulae: dict[str, Callable[[], Any]] = {
+        "1": lambda: np.ones(len(cells)),
+        "n": lambda: np.log(cells["N_D"].clip(lower=1).to_numpy(float) / 8),
+        "few": lambda: cells["N_D"].clip(lower=1).to_numpy(float) ** -0.5,
+        "a": lambda: np.where(cells["kind"] == "none", 0.0, np.log(cells["A"].to_numpy(float) / base)),
+        "p": lambda: np.log(cells["floor"].to_numpy(float) / base),
+        "h": lambda: np.log(cells["ahead"].to_numpy(float) / 2),
+        "froude": lambda: np.log(cells["froude"].to_numpy(float) / 0.2),
+        "size": lambda: np.log(cells["length"].to_numpy(float) / 50),
+    }
+    parts = {part for name in names for part in name.split(":")}
+    known = {part: formulae[part]() if part in formulae else (cells["kind"] == part).to_numpy(float) for part in parts}
+    return np.stack([np.prod([known[part] for part in name.split(":")], axis=0) for name in names], axis=1)
+
+
+def group_codes(cells: pd.DataFrame, level: str) -> Array:
+    """Return a number (rows,) for each group of a level."""
+    return np.asarray(cells.groupby(level.split(), sort=False).ngroup())
+
+
+@dataclass(frozen=True)
+class Hierarchy:
+    """A fitted response: theta (P,) with its covariance (P, P), variances (levels,), and how many ships taught it.
+
+    theta ends with c, the share of the floor, where the response has one.
+    """
+
+    response: Response
+    theta: Array
+    covariance: Array
+    variances: Array
+    ships: int
+
+    def mean(self, cells: pd.DataFrame) -> tuple[Array, Array]:
+        """ln(value / unit) (rows,) without effects, and its derivatives (rows, P) by theta."""
+        return mean_of_features(self.theta, *_both_features(self.response, cells))
+
+    def spread(self, cells: pd.DataFrame, jacobian: Array) -> Array:
+        """Covariance (rows, rows) of cells of one ship: effects, rest, and what is unknown of theta."""
+        parts = zip(self.variances, _kernels(self.response, cells), strict=True)
+        return np.asarray(sum((one * kernel for one, kernel in parts), jacobian @ self.covariance @ jacobian.T))
+
+    def deviations(
+        self, cells: pd.DataFrame, draws: int, rng: np.random.Generator, own: pd.DataFrame | None = None
+    ) -> Array:
+        """Student draws (draws, rows) of value less `mean` for cells of one ship, given those of its cells in `own`.
+
+        Known cells move them and make them narrower; ones that are further off than expected make them wider.
+        """
+        known = cells.head(0) if own is None else response_rows(self.response, own)
+        joined = pd.concat([known, cells], ignore_index=True)
+        mean, jacobian = self.mean(joined)
+        spread, count, freedom = self.spread(joined, jacobian), len(known), self.freedom
+        centre = np.zeros(len(cells))
+        if count:
+            gain = np.linalg.solve(spread[:count, :count], spread[:count, count:]).T
+            apart = response_values(self.response, known) - mean[:count]
+            distance = apart @ np.linalg.solve(spread[:count, :count], apart)
+            centre = gain @ apart
+            spread = spread[count:, count:] - gain @ spread[:count, count:]
+            spread, freedom = spread * (freedom + distance) / (freedom + count), freedom + count
+        values, vectors = np.linalg.eigh(spread)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        scale = np.sqrt(freedom / rng.chisquare(freedom, draws))
+        return np.asarray(centre + scale[:, None] * (rng.standard_normal((draws, len(cells))) @ root.T))
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of Student draws for a new ship: ships less the effects that each of them has."""
+        return float(max(self.ships - sum(level == SHIP for level, _ in self.response.levels), 3))
+
+
+def _both_features(response: Response, cells: pd.DataFrame) -> tuple[Array, Array]:
+    """Features (rows, F) of what data reduce, and (rows, G) of the floor."""
+    return tuple(np.split(feature_columns(cells, response.features + response.floor), [len(response.features)], axis=1))  # type: ignore[return-value]
+
+
+def mean_of_features(theta: Array, features: Array, floor: Array) -> tuple[Array, Array]:
+    """ln(value / unit) (rows,) of features, and its derivatives (rows, P) by theta (P,)."""
+    linear, low = features @ theta[: features.shape[1]], floor @ theta[features.shape[1] :]
+    if not floor.shape[1]:
+        return linear, features
+    total = np.logaddexp(2 * linear, 2 * low) / 2
+    share = np.exp(2 * (linear - total))[:, None]
+    return total, np.hstack([share * features, (1 - share) * floor])
+
+
+def _kernels(response: Response, cells: pd.DataFrame) -> list[Array]:
+    """Covariances (rows, rows) of the effects of cells of one ship, at variance one."""
+    features = feature_columns(cells, [feature for _, feature in response.levels])
+    codes = {level: group_codes(cells, level) for level, _ in response.levels}
+    same = {level: code[:, None] == code for level, code in codes.items()}
+    return [
+        same[level] * np.outer(column, column) for (level, _), column in zip(response.levels, features.T, strict=True)
+    ]
+
+
+def response_values(response: Response, cells: pd.DataFrame) -> Array:
+    """Return ln(value / unit) (rows,) of cells."""
+    return np.asarray(np.log(cells[response.value] / cells[response.unit]), float)
+
+
+def response_rows(response: Response, cells: pd.DataFrame) -> pd.DataFrame:
+    """Return the cells that teach a response: with runs for H, else one for each foundation, or ship, and horizon."""
+    if response.value == "H":
+        return cells[cells["N_D"] > 0]
+    if response.value == "A":
+        return cells[cells["kind"] != "none"].drop_duplicates(["ship", "foundation", "ahead"])
+    return cells.drop_duplicates(["ship", "ahead"])
+
+
+@dataclass(frozen=True)
+class ShipDesign:
+    """Rows of one ship, sorted by cell: values (rows,), both features, and what makes their covariance.
+
+    effects (rows, G) with their levels (G,), all but those of a cell and a row. starts, counts (cells,): rows of each
+    cell; weights (cells, inner levels): squared features of the levels of a cell.
+    """
+
+    values: Array
+    features: Array
+    floor: Array
+    effects: Array
+    levels: Array
+    starts: Array
+    counts: Array
+    weights: Array
+
+    @classmethod
+    def of(cls, response: Response, cells: pd.DataFrame) -> ShipDesign:
+        """Design of the rows of one ship."""
+        rows = cells.iloc[np.argsort(group_codes(cells, CELL), kind="stable")]
+        features = feature_columns(rows, [feature for _, feature in response.levels])
+        effects, levels = [], []
+        for place, (level, _) in enumerate(response.levels[:-1]):
+            if level != CELL:
+                code = group_codes(rows, level)
+                effects.append(np.where(code[:, None] == np.unique(code), features[:, [place]], 0.0))
+                levels += [place] * effects[-1].shape[1]
+        starts = np.unique(group_codes(rows, CELL), return_index=True)[1]
+        inner = [place for place, (level, _) in enumerate(response.levels) if level == CELL]
+        return cls(
+            response_values(response, rows),
+            *_both_features(response, rows),
+            np.hstack(effects),
+            np.array(levels),
+            starts,
+            np.diff([*starts, len(rows)]),
+            features[starts][:, inner] ** 2,
+        )
+
+    def sums(self, columns: Array) -> Array:
+        """Sums (cells, ...) of columns (rows, ...) over the rows of each cell."""
+        return np.asarray(np.add.reduceat(columns, self.starts, axis=0))
+
+    def whiten(self, columns: Array, shrink: Array, rest: float) -> Array:
+        """Columns (rows, K) times the inverse root of the covariance of cells and rows."""
+        means = self.sums(columns) / self.counts[:, None]
+        return np.asarray((columns - np.repeat(shrink[:, None] * means, self.counts, axis=0)) / np.sqrt(rest))
+
+
+def ship_designs(response: Response, cells: pd.DataFrame) -> dict[str, ShipDesign]:
+    """Ship -> design of the cells that teach a response."""
+    ships = response_rows(response, cells).groupby("ship", sort=False)
+    return {str(name): ShipDesign.of(response, part) for name, part in ships}
+
+
+def fit_hierarchy(
+    response: Response, ships: Sequence[ShipDesign], start: Hierarchy | None = None, rounds: int = 100
+) -> Hierarchy:
+    """Fit a response to the cells of many ships by restricted maximum likelihood and Gaussian priors.
+
+    Each round is a step of Gauss and Newton for theta and one of minorisation and maximisation for the variances
+    (Zhou et al., Journal of Computational and Graphical Statistics 28 (2019) 350), which never lowers the likelihood:
+
+        s <- s sqrt(r' V^-1 K V^-1 r / tr(P K)),    r = y - mean,    P = V^-1 - V^-1 J C J' V^-1
+
+    start : a fit to begin with. rounds : at most; they end where no standard deviation changes by more than 1 %.
+    """
+    centre, widths = prior_of(response)
+    theta = start.theta if start else centre
+    variances = start.variances if start else np.full(len(response.levels), 0.03)
+    for _ in range(rounds):
+        theta, covariance, factor = _improve(response, ships, theta, variances, centre, np.diag(widths**-2))
+        variances = np.maximum(variances * factor, 1e-8)
+        if np.abs(np.log(factor[variances > 1e-4])).max(initial=0.0) < 0.02:
+            break
+    return Hierarchy(response, theta, covariance, variances, len(ships))
+
+
+def prior_of(response: Response) -> tuple[Array, Array]:
+    """Means and standard deviations (P,) of the Gaussian priors of theta."""
+    widths = [NARROW if name.split(":")[0] in FLAWS and response.floor else WIDE for name in response.features]
+    centre = [CENTRE.get(name, 0.0) * bool(response.floor) for name in response.features]
+    centre += [FLOOR_CENTRE.get(name, 0.0) for name in response.floor]
+    return np.array(centre), np.array(widths + [WIDE if name in NO_PHYSICS else 1.0 for name in response.floor])
+
+
+def _improve(
+    response: Response, ships: Sequence[ShipDesign], theta: Array, variances: Array, centre: Array, prior: Array
+) -> tuple[Array, Array, Array]:
+    """Theta after one step, its covariance, and the factors (levels,) of the variances."""
+    inner = np.array([level == CELL for level, _ in response.levels])
+    rest, normal, right, solved = variances[-1], prior.copy(), prior @ (centre - theta), []
+    for ship in ships:
+        within = ship.weights @ variances[inner]
+        shrink = 1 - np.sqrt(rest / (rest + ship.counts * within))
+        mean, jacobian = mean_of_features(theta, ship.features, ship.floor)
+        joined = ship.whiten(np.column_stack([ship.effects, jacobian, ship.values - mean]), shrink, rest)
+        effects, plain = np.split(joined, [ship.effects.shape[1]], axis=1)
+        scaled = effects * np.sqrt(variances[ship.levels])
+        root = np.linalg.cholesky(np.eye(scaled.shape[1]) + scaled.T @ scaled)
+        taken = np.linalg.solve(root, scaled.T).T
+        slopes = plain - taken @ (taken.T @ plain)
+        normal += plain[:, :-1].T @ slopes[:, :-1]
+        right += slopes[:, :-1].T @ plain[:, -1]
+        solved.append((ship, effects, taken, slopes, within, shrink))
+    covariance = np.linalg.inv(normal)
+    step, spread = np.clip(covariance @ right, -MOST_STEP, MOST_STEP), np.linalg.cholesky(covariance)
+    quadratic, trace = np.zeros((2, len(variances)))
+    for ship, effects, taken, slopes, within, shrink in solved:
+        residual = slopes[:, -1:] - slopes[:, :-1] @ step[:, None]
+        taken = np.hstack([taken, slopes[:, :-1] @ spread])
+        np.add.at(quadratic, ship.levels, (effects.T @ residual)[:, 0] ** 2)
+        np.add.at(trace, ship.levels, (effects**2).sum(axis=0) - ((taken.T @ effects) ** 2).sum(axis=0))
+        residual, taken = (ship.whiten(one, shrink, rest) for one in (residual, taken))
+        total = rest + ship.counts * within
+        quadratic[inner] += ship.weights.T @ ship.sums(residual)[:, 0] ** 2
+        trace[inner] += ship.weights.T @ (ship.counts / total - (ship.sums(taken) ** 2).sum(axis=1))
+        quadratic[-1] += (residual**2).sum()
+        trace[-1] += ((ship.counts - 1 + rest / total) / rest).sum() - (taken**2).sum()
+    return theta + step, covariance, np.sqrt(quadratic / trace)
+
+
+@dataclass(frozen=True)
+class UnseenShip:
+    """A ship that the law has not seen: length [m], service speed [m/s] and, where they are known, what it meets.
+
+    baseline, floor : errors [m] of constant u, v, r and of the true physics over the horizon that is asked for; drawn
+        from the ships of the law where they are not known. sea : calm, ordinary or rough: the third of the ships of the
+        law, by floor / baseline, from which the floor is drawn; empty: all.
+    """
+
+    length: float
+    speed: float
+    baseline: float | None = None
+    floor: float | None = None
+    sea: str = ""
+
+    @property
+    def froude(self) -> float:
+        """Speed / sqrt(g length)."""
+        return float(self.speed / np.sqrt(GRAVITY * self.length))
+
+
+@dataclass(frozen=True)
+class ExchangeLaw:
+    """The law, learned from many ships.
+
+    parts : response -> its fit. limits : column -> least and greatest of the cells that it learned from; A in ship
+    lengths. provenance : of the cells. own : cells of the ship that it is asked about, which condition it.
+    """
+
+    parts: Mapping[str, Hierarchy]
+    limits: Mapping[str, tuple[float, float]]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    own: pd.DataFrame | None = None
+
+    def given(self, own: pd.DataFrame) -> ExchangeLaw:
+        """The law of one ship, of which some cells are known: what `expect` draws agrees with them."""
+        return replace(self, own=check_cells(own))
+
+    def expect(
+        self, ship: UnseenShip, foundation: Physics, amounts: Sequence[int], ahead: float, draws: int, seed: int = 0
+    ) -> Array:
+        """Predictive draws (draws, amounts) of H [m]; see `expect_all`."""
+        return self.expect_all(ship, [foundation], amounts, ahead, draws, seed)[:, 0]
+
+    def expect_all(
+        self,
+        ship: UnseenShip,
+        foundations: Sequence[Physics],
+        amounts: Sequence[int],
+        ahead: float,
+        draws: int,
+        seed: int = 0,
+    ) -> Array:
+        """Predictive draws (draws, foundations, amounts) of H [m]; each draw is one ship with all its cells.
+
+        foundations : kind, A [m], or both, of a physics; or the name of one in `own`. A alone is of any kind of error.
+        amounts : runs; 0 is the physics alone. ahead : horizon [ship lengths].
+
+        Draws are Student's, with as many degrees of freedom as there are ships beyond the effects of each. Raises
+        ShipidError for a foundation that is no kind.
+        """
+        rng, own = np.random.default_rng(seed), self._own_rows()
+        cells = _cells_to_draw(ship, foundations, ahead, own)
+        many = cells.drop(columns=["ship", "foundation"]).loc[np.tile(cells.index, draws)].reset_index(drop=True)
+        many["kind"] = pd.Categorical(many["kind"].where(many["kind"] != ANY, rng.choice(FLAWS, len(many))))
+        for name in ("baseline", "floor", "A"):
+            unknown = cells[name].isna() & (cells["kind"] != "none" if name == "A" else True)
+            values = self._draw(name, cells[unknown], many[np.tile(unknown, draws)], draws, rng, sea=ship.sea)
+            if name == "floor":  # no physics is better than the true one
+                values = np.fmin(values, cells["A"].min())
+            many.loc[np.tile(unknown, draws), name] = values.ravel()
+            cells.loc[unknown, name] = np.median(values, axis=0)
+        for one in (cells, many):  # of what the physics adds to the floor, some have a share
+            reducible = (one["A"] ** 2 - one["floor"] ** 2).clip(lower=0) * one["share"] ** 2
+            one["A"] = one["A"].where(one["share"] == 1, np.sqrt(one["floor"] ** 2 + reducible))
+        taught = np.array([amount for amount in amounts if amount > 0])
+        asked, each = (
+            one.loc[one.index.repeat(len(taught))].assign(N_D=np.tile(taught, len(one))) for one in (cells, many)
+        )
+        alone = many["A"].fillna(many["baseline"]).to_numpy().reshape(draws, -1, 1)
+        result = np.repeat(alone, len(amounts), axis=2)
+        shape = (draws, len(cells), len(taught))
+        result[:, :, np.array(amounts) > 0] = self._draw("H", asked, each, draws, rng, own).reshape(shape)
+        return result
+
+    def _draw(
+        self,
+        name: str,
+        cells: pd.DataFrame,
+        many: pd.DataFrame,
+        draws: int,
+        rng: np.random.Generator,
+        own: pd.DataFrame | None = None,
+        sea: str = "",
+    ) -> Array:
+        """Draws (draws, rows) of a response of cells; `many` has their rows once for each draw, with what was drawn."""
+        part = self.parts[name]
+        mean = part.mean(many)[0].reshape(draws, -1)
+        deviation = part.deviations(cells, len(SEAS) * draws if name == "floor" and sea else draws, rng, own)
+        if len(deviation) > draws:
+            third = np.array_split(np.argsort(deviation[:, 0]), len(SEAS))[SEAS.index(sea)]
+            deviation = deviation[rng.permutation(third)]
+        return np.asarray(np.exp(mean + deviation) * many[part.response.unit].to_numpy().reshape(draws, -1))
+
+    def _own_rows(self) -> pd.DataFrame | None:
+        """Cells of the own ship with runs, their floor filled with what the law expects where it is not known."""
+        if self.own is None:
+            return None
+        own = self.own.assign(ship=ASKED)
+        unknown = own["floor"].isna()
+        if unknown.any():
+            mean = self.parts["floor"].mean(own.assign(floor=own["baseline"]))[0]
+            least = own.groupby("ahead")["A"].transform("min")
+            own["floor"] = own["floor"].fillna(np.fmin(own["baseline"] * np.exp(mean), least))
+        return own
+
+
+def _cells_to_draw(
+    ship: UnseenShip, foundations: Sequence[Physics], ahead: float, own: pd.DataFrame | None
+) -> pd.DataFrame:
+    """A row for each foundation; A, baseline and floor are NaN where they are to be drawn."""
+    here = pd.DataFrame(columns=["foundation"]) if own is None else own[np.isclose(own["ahead"], ahead)]
+    same: dict[str, Any] = {"ship": ASKED, "ahead": ahead, "N_D": 0, "length": ship.length, "froude": ship.froude}
+    same |= {
+        name: np.nan if value is None else value for name, value in (("baseline", ship.baseline), ("floor", ship.floor))
+    }
+    if len(here):
+        same |= {name: here[name].iloc[0] for name in ("baseline", "floor")}
+    rows = []
+    for foundation in foundations:
+        known = here[here["foundation"] == foundation]
+        kind, error = foundation if isinstance(foundation, tuple) else (foundation, np.nan)
+        kind, share = LIKELY.get(kind, (kind, 1.0)) if isinstance(kind, str) else (kind, 1.0)
+        if len(known):
+            kind, error = known["kind"].iloc[0], known["A"].iloc[0]
+        elif not isinstance(kind, str):
+            kind, error = ANY, float(kind)
+        elif kind not in CELL_KINDS:
+            raise ShipidError(f"{kind!r} is no kind: give one of {', '.join([*LIKELY, *CELL_KINDS])}", path="kind")
+        rows.append({**same, "foundation": str(foundation), "kind": kind, "A": error, "share": share})
+    return pd.DataFrame(rows)
+
+
+def fit_law(cells: pd.DataFrame) -> ExchangeLaw:
+    """Fit the law to the cells of many ships; see `fit_hierarchy`."""
+    cells = check_cells(cells)
+    parts = {
+        name: fit_hierarchy(response, [*ship_designs(response, cells).values()]) for name, response in RESPONSES.items()
+    }
+    sizes = cells.assign(A=cells["A"] / cells["length"])
+    limits = {name: (float(sizes[name].min()), float(sizes[name].max())) for name in LIMITED}
+    return ExchangeLaw(parts, limits)
+
+
+def save_law(law: ExchangeLaw, file: Path) -> None:
+    """Write a law as JSON: of each response theta, covariance, variances and ships, then limits and provenance."""
+    parts = {
+        name: {
+            "features": list(part.response.features),
+            "levels": [" : ".join(level) for level in part.response.levels],
+        }
+        | {key: getattr(part, key) for key in ("theta", "covariance", "variances")}
+        | {"ships": part.ships}
+        for name, part in law.parts.items()
+    }
+    write_json(file, {"parts": parts, "limits": law.limits, "provenance": law.provenance})
+
+
+def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
+    """Read the law that comes with shipid, or another one; ResultError for a file of other features or none."""
+    content, parts = read_json(file), {}
+    try:
+        for name, response in RESPONSES.items():
+            part = content["parts"][name]
+            if part["features"] != list(response.features):
+                raise ResultError("has other features than this version of shipid: fit it anew", file=file, path=name)
+            theta, covariance, variances = (np.array(part[key], float) for key in ("theta", "covariance", "variances"))
+            parts[name] = Hierarchy(response, theta, covariance, variances, part["ships"])
+        limits = {name: (float(low), float(high)) for name, (low, high) in content["limits"].items()}
+        return ExchangeLaw(parts, limits, content["provenance"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultError(f"is no law of exchange ({error!r})", file=file) from None
