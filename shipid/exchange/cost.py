@@ -10,15 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.errors import ShipidError
+from shipid.exchange.expect import study_cells
+from shipid.exchange.law import read_law
+from shipid.report.content import model_text
+from shipid.report.wording import counted_text, difference_text, metres_text
+from shipid.study.declared import NO_MODEL
+from shipid.study.results import Results
 from shipid.study.schema import Cost
+from shipid.units import percent_text
 
 Array = NDArray[np.float64]
+DRAWS = 2000
 PROBABLE = 0.8  # chance from which on a way is said to reach a goal
 AMOUNTS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 100)
 """Numbers of runs that are tried."""
@@ -140,15 +149,115 @@ class Ways:
         known = np.isfinite(self.error) & (self.cost.H_end_required is not None)
         return np.where(known, self.good, np.nan).mean(axis=0)
 
+    def best(self, place: int | None = None) -> tuple[int, int]:
+        """Places (f, k) of the best way, or of the best one with one physics.
+
+        By expected loss; towards a goal the cheapest that reaches it with `PROBABLE`, or the surest where none does.
+        """
+        one = np.full(len(self.prices), place is None)[:, None] | (np.arange(len(self.prices)) == place)[:, None]
+        rank = self.expected
+        if self.cost.per_metre is None:
+            reach = np.nan_to_num(self.reach, nan=-1.0)
+            rank = np.where(reach >= PROBABLE, self.price, (2 - reach) * (1 + self.price.max()))
+        f, k = np.unravel_index(np.where(one, rank, np.inf).argmin(), rank.shape)
+        return int(f), int(k)
+
     def table(self) -> pd.DataFrame:
         """A row per way that there is: foundation, N_D, price, H_end, low, high, probability, expected loss.
 
-        H_end is the median of the error [m], low and high its 95 % interval.
+        H_end is the median of the error [m], low and high its 95 % interval. chosen : the best of its foundation.
+        frontier : no way with a lower error is as cheap. unit, goal [m] : of all rows.
         """
-        low, middle, high = np.quantile(self.error, [0.025, 0.5, 0.975], axis=0)
-        columns = {"price": self.price, "H_end": middle, "low": low, "high": high}
-        columns |= {"probability": self.reach, "expected": self.expected}
-        names, amounts = np.repeat(list(self.foundations), len(self.amounts)), np.tile(self.amounts, len(low))
-        frame = pd.DataFrame({"foundation": names, "N_D": amounts.astype(int)})
-        frame = frame.assign(**{name: values.ravel() for name, values in columns.items()})
-        return frame[frame["H_end"].notna()].reset_index(drop=True)
+        known = np.isfinite(self.error).all(axis=0)
+        low, middle, high = np.quantile(np.where(known, self.error, 1.0), [0.025, 0.5, 0.975], axis=0)
+        chosen = np.zeros(known.shape, dtype=bool)
+        chosen[tuple(np.transpose([self.best(place) for place in range(len(self.prices))]))] = True
+        names, amounts = np.meshgrid(list(self.foundations), self.amounts.astype(int), indexing="ij")
+        columns = {"foundation": names, "N_D": amounts, "price": self.price, "H_end": middle, "low": low, "high": high}
+        columns |= {"probability": self.reach, "expected": self.expected, "chosen": chosen}
+        frame = pd.DataFrame({name: values[known] for name, values in columns.items()})
+        best = frame.sort_values(["price", "H_end"])["H_end"].cummin().reindex(frame.index)
+        goal = self.cost.H_end_required
+        return frame.assign(frontier=frame["H_end"] <= best, unit=self.cost.unit, goal=np.nan if goal is None else goal)
+
+    def sentences(self) -> list[str]:
+        """What to buy, what the next runs and other physics would change, and when to stop."""
+        cost, (f, k) = self.cost, self.best()
+        goal, way = cost.H_end_required, self.way_text(f, k)
+        aim = "The cheapest way in all" if goal is None else f"The cheapest way to {metres_text(goal)} at the horizon"
+        lines = [f"{aim}, of those tried, is {way}."]
+        if goal is not None and not self.reach[f, k] >= PROBABLE:
+            lines = [f"No way that was tried is likely to reach {metres_text(goal)}; the surest is {way}."]
+        if k + 1 < len(self.amounts):
+            count, change = int(self.amounts[k + 1] - self.amounts[k]), self.expected[f, k + 1] - self.expected[f, k]
+            more = f"{counted_text(count, 'further run')} would cost {self.money(self.runs[k + 1] - self.runs[k])}"
+            gain = f"a chance of {percent_text(self.reach[f, k + 1])}" if goal else f"{self.money(change)} more in all"
+            lines.append(f"{more}, for an error of {metres_text(np.median(self.error[:, f, k + 1]))}: {gain}.")
+        others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
+        lines += [f"With other physics: {'; '.join(others)}."] if others else []
+        amount, bought = self.next_step()
+        step = "stop here" if bought is None else f"buy {model_text(self.foundations[bought])}"
+        step = step if amount is None else f"go on to {counted_text(amount, 'run')} and look again"
+        if goal is None:
+            least = metres_text(cost.run / (cost.per_metre or 1))
+            return [*lines, f"Next: {step}. Stop when a further run lowers the error by less than {least}, its price."]
+        total = self.money(min(self.after_runs.min(initial=np.inf), self.after_buying.min()))
+        return [*lines, f"To see the goal reached on runs: {step}, and stop as soon as it is. Expect to pay {total}."]
+
+    def money(self, amount: float) -> str:
+        """An amount with its unit."""
+        return f"{amount:,.0f} {self.cost.unit}" if abs(amount) >= 100 else f"{amount:.3g} {self.cost.unit}"
+
+    def way_text(self, f: int, k: int) -> str:
+        """A way, its price, its error, and its chance or its loss, in words."""
+        low, middle, high = np.quantile(self.error[:, f, k], [0.025, 0.5, 0.975])
+        text = f"{model_text(self.foundations[f])} with {counted_text(int(self.amounts[k]), 'run')} for "
+        text += f"{self.money(self.price[f, k])}: {difference_text(middle, low, high)}"
+        if self.cost.per_metre is None:
+            return f"{text}, a chance of {percent_text(self.reach[f, k])}"
+        return f"{text}, {self.money(self.expected[f, k])} with what the error costs"
+
+
+@lru_cache(1)
+def study_ways(results: Results) -> Ways:
+    """Ways to the goal of a study that has `[cost]`, by the law given the cells of the study.
+
+    Recorded runs that may train are there already. A name of `[cost.foundations]` is a family, of which each draw is
+    one member, or a kind of physics that has not been tried. Raises ShipidError where no vessel has a length, or no
+    cell a result.
+    """
+    cost = results.plan.study.cost
+    assert cost is not None
+    own, ship = study_cells(results)
+    own["kind"] = own["kind"].replace("", "moderate")
+    ends = results.judged_cells.query("status == 'ok'")
+    if own.empty:
+        raise ShipidError("no cell has a result", file=results.folder)
+    have = results.pool if results.plan.study.data is not None else 0
+    amounts = [have, *(amount for amount in AMOUNTS if amount > have)]
+    names = [NO_MODEL, *cost.foundations]
+    members = [list(own["foundation"][own["family"] == name].unique()) or [name] for name in names]
+    law, ahead = read_law().given(own), float(own["ahead"].iloc[0])
+    drawn = law.expect_all(ship, [one for several in members for one in several], amounts, ahead, DRAWS)
+    first = np.cumsum([0, *map(len, members[:-1])])
+    taken = first + np.random.default_rng(0).integers([len(several) for several in members], size=(DRAWS, len(names)))
+    error = drawn[np.arange(DRAWS)[:, None], taken] * float((ends["H_end"] / ends["H"]).median())
+    error[:, 0, np.array(amounts) == 0] = np.nan
+    prices = np.array([0.0, *cost.foundations.values()])
+    return Ways(cost, names, np.array(amounts, dtype=float), error, prices)
+
+
+def cost_frame(results: Results) -> pd.DataFrame:
+    """The table of the ways of a study, see `Ways.table`; empty where there are none."""
+    try:
+        return pd.DataFrame() if results.plan.study.cost is None else study_ways(results).table()
+    except ShipidError:
+        return pd.DataFrame()
+
+
+def cost_sentences(results: Results) -> list[str]:
+    """What a study says on what to buy; nothing where it has no `[cost]`."""
+    try:
+        return [] if results.plan.study.cost is None else study_ways(results).sentences()
+    except ShipidError as error:
+        return [f"What to buy cannot be said: {error.message}."]

@@ -159,6 +159,8 @@ class Claims(Strict):
         return {*self.aside, *([self.nominal] if self.nominal else [])}
 
 
+KINDS_OF_PHYSICS = ("nominal", "damping", "mass", "thrust", "missing", "moderate", "high", "template", "sister")
+"""What may be wrong with the physics of a ship that the law of exchange knows; nominal: nothing."""
 Price = Annotated[FiniteFloat, Field(ge=0)]
 
 
