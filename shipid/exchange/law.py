@@ -1,0 +1,496 @@
+"""The law of exchange: H over the error of the physics, runs and horizon, by a hierarchical fit over ships.
+
+Every error is taken in units of the baseline, the error of constant u, v, r on the same windows. With n = ln(N_D / 8),
+a = ln(A / baseline), p = ln(floor / baseline), h = ln(ahead / 2):
+
+    ln(H / baseline) = ln(sqrt(R^2 + F^2)) + effects + rest,    R = exp(theta . features),    F = exp(c + p)
+
+R is what data can reduce, F the floor of sea and sensors. Effects of a ship, of a kind of physics on a ship, of a
+foundation and of the runs drawn are Gaussian with variances that the cells tell (`fit_hierarchy`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from shipid.errors import ResultError, ShipidError
+from shipid.exchange.cells import CELL_KINDS, check_cells
+from shipid.files import read_json, write_json
+from shipid.units import GRAVITY
+
+Array = np.ndarray
+Physics = str | float | tuple[str, float]
+"""A kind of physics of `CELL_KINDS`, its A [m], or both."""
+LAW_FILE = Path(__file__).with_name("law.json")
+LAW_DIGITS = 8  # of numbers in the file: rounding moves a prediction by less than 1e-5
+
+
+class Response(NamedTuple):
+    """What a hierarchy predicts: ln(value / unit), with its features and the levels of its effects.
+
+    levels : (columns that make a group, feature of its effect); the last one is that of a row. floored : whether the
+    floor adds in squares.
+    """
+
+    value: str
+    unit: str
+    features: tuple[str, ...]
+    levels: tuple[tuple[str, str], ...]
+    floored: bool = False
+
+
+SHIP, KIND, FOUNDATION, RUNS, CELL, ROW = (
+    "ship",
+    "ship kind",
+    "ship foundation",
+    "ship N_D",
+    "ship foundation N_D",
+    "ship foundation N_D ahead",
+)
+FLAWS = tuple(kind for kind in CELL_KINDS if kind not in ("none", "nominal"))
+RESPONSES = {
+    "H": Response(
+        "H",
+        "baseline",
+        ("1", "n", "a", "a:n", "p", "p:n", "h", "h:n", "none", "none:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
+        (
+            *((SHIP, feature) for feature in ("1", "n", "a", "h")),
+            *((level, feature) for level in (KIND, FOUNDATION) for feature in ("1", "n")),
+            *((level, feature) for level in (RUNS, CELL) for feature in ("1", "few")),
+            (ROW, "1"),
+        ),
+        True,
+    ),
+    "A": Response(
+        "A",
+        "baseline",
+        ("h", "p", "nominal", *FLAWS),
+        ((SHIP, "1"), (SHIP, "h"), (KIND, "1"), (FOUNDATION, "1"), ("ship foundation ahead", "1")),
+    ),
+    "floor": Response(
+        "floor", "baseline", ("1", "h", "froude", "size"), ((SHIP, "1"), (SHIP, "h"), ("ship ahead", "1"))
+    ),
+    "baseline": Response(
+        "baseline", "length", ("1", "h", "froude", "size"), ((SHIP, "1"), (SHIP, "h"), ("ship ahead", "1"))
+    ),
+}
+SEAS = ("calm", "ordinary", "rough")
+ASKED = "asked"  # name of the ship that the law is asked about
+LIMITED = ("length", "froude", "N_D", "ahead", "A")
+WIDE, NARROW = 3.0, 0.3  # standard deviations of the Gaussian priors of features, and of those of a kind
+
+
+def feature_columns(cells: pd.DataFrame, names: Sequence[str]) -> Array:
+    """Return the features (rows, names) of cells; `a:n` is a product."""
+    physics, base = cells["A"].where(cells["kind"] != "none", cells["baseline"]), cells["baseline"]
+    runs = cells["N_D"].clip(lower=1)
+    known: dict[str, Any] = {
+        "1": 1.0,
+        "n": np.log(runs / 8),
+        "few": runs**-0.5,
+        "a": np.log(physics / base),
+        "p": np.log(cells["floor"] / base),
+        "h": np.log(cells["ahead"] / 2),
+        "froude": np.log(cells["froude"] / 0.2),
+        "size": np.log(cells["length"] / 50),
+    } | {kind: (cells["kind"] == kind).astype(float) for kind in CELL_KINDS}
+    columns = [np.prod(np.broadcast_arrays(*(known[part] for part in name.split(":"))), axis=0) for name in names]
+    return np.stack(np.broadcast_arrays(np.zeros(len(cells)), *columns)[1:], axis=1)
+
+
+def group_codes(cells: pd.DataFrame, level: str) -> Array:
+    """Return a number (rows,) for each group of a level."""
+    return np.asarray(cells.groupby(level.split(), sort=False).ngroup())
+
+
+@dataclass(frozen=True)
+class Hierarchy:
+    """A fitted response: theta (P,) with its covariance (P, P), variances (levels,), and how many ships taught it.
+
+    theta ends with c, the share of the floor, where the response has one.
+    """
+
+    response: Response
+    theta: Array
+    covariance: Array
+    variances: Array
+    ships: int
+
+    def mean(self, cells: pd.DataFrame) -> tuple[Array, Array]:
+        """ln(value / unit) (rows,) without effects, and its derivatives (rows, P) by theta."""
+        features = feature_columns(cells, self.response.features)
+        return mean_of_features(self.response, self.theta, features, feature_columns(cells, ["p"])[:, 0])
+
+    def spread(self, cells: pd.DataFrame, jacobian: Array) -> Array:
+        """Covariance (rows, rows) of cells of one ship: effects, rest, and what is unknown of theta."""
+        parts = zip(self.variances, _kernels(self.response, cells), strict=True)
+        return np.asarray(sum((one * kernel for one, kernel in parts), jacobian @ self.covariance @ jacobian.T))
+
+    def deviations(
+        self, cells: pd.DataFrame, draws: int, rng: np.random.Generator, own: pd.DataFrame | None = None
+    ) -> Array:
+        """Student draws (draws, rows) of value less `mean` for cells of one ship, given those of its cells in `own`.
+
+        Known cells move them and make them narrower; ones that are further off than expected make them wider.
+        """
+        known = cells.head(0) if own is None else response_rows(self.response, own)
+        joined = pd.concat([known, cells], ignore_index=True)
+        mean, jacobian = self.mean(joined)
+        spread, count, freedom = self.spread(joined, jacobian), len(known), self.freedom
+        centre = np.zeros(len(cells))
+        if count:
+            gain = np.linalg.solve(spread[:count, :count], spread[:count, count:]).T
+            apart = response_values(self.response, known) - mean[:count]
+            distance = apart @ np.linalg.solve(spread[:count, :count], apart)
+            centre = gain @ apart
+            spread = spread[count:, count:] - gain @ spread[:count, count:]
+            spread, freedom = spread * (freedom + distance) / (freedom + count), freedom + count
+        values, vectors = np.linalg.eigh(spread)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        scale = np.sqrt(freedom / rng.chisquare(freedom, draws))
+        return np.asarray(centre + scale[:, None] * (rng.standard_normal((draws, len(cells))) @ root.T))
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of Student draws for a new ship: ships less the effects that each of them has."""
+        return float(max(self.ships - sum(level == SHIP for level, _ in self.response.levels), 3))
+
+
+def mean_of_features(response: Response, theta: Array, features: Array, floor: Array) -> tuple[Array, Array]:
+    """ln(value / unit) (rows,) of features (rows, F) and p (rows,), and its derivatives (rows, P) by theta."""
+    linear = features @ theta[: features.shape[1]]
+    if not response.floored:
+        return linear, features
+    total = np.logaddexp(2 * linear, 2 * (theta[-1] + floor)) / 2
+    share = np.exp(2 * (linear - total))[:, None]
+    return total, np.hstack([share * features, 1 - share])
+
+
+def _kernels(response: Response, cells: pd.DataFrame) -> list[Array]:
+    """Covariances (rows, rows) of the effects of cells of one ship, at variance one."""
+    features = feature_columns(cells, [feature for _, feature in response.levels])
+    codes = {level: group_codes(cells, level) for level, _ in response.levels}
+    same = {level: code[:, None] == code for level, code in codes.items()}
+    return [
+        same[level] * np.outer(column, column) for (level, _), column in zip(response.levels, features.T, strict=True)
+    ]
+
+
+def response_values(response: Response, cells: pd.DataFrame) -> Array:
+    """Return ln(value / unit) (rows,) of cells."""
+    return np.asarray(np.log(cells[response.value] / cells[response.unit]), float)
+
+
+def response_rows(response: Response, cells: pd.DataFrame) -> pd.DataFrame:
+    """Return the cells that teach a response: with runs for H, else one for each foundation, or ship, and horizon."""
+    if response.value == "H":
+        return cells[cells["N_D"] > 0]
+    if response.value == "A":
+        return cells[cells["kind"] != "none"].drop_duplicates(["ship", "foundation", "ahead"])
+    return cells.drop_duplicates(["ship", "ahead"])
+
+
+@dataclass(frozen=True)
+class _Design:
+    """Rows of one ship, sorted by cell: values (rows,), features, floor p (rows, 1), and what makes their covariance.
+
+    effects (rows, G) with their levels (G,), all but those of a cell and a row. starts, counts (cells,): rows of each
+    cell; weights (cells, inner levels): squared features of the levels of a cell.
+    """
+
+    values: Array
+    features: Array
+    floor: Array
+    effects: Array
+    levels: Array
+    starts: Array
+    counts: Array
+    weights: Array
+
+    @classmethod
+    def of(cls, response: Response, cells: pd.DataFrame) -> _Design:
+        rows = cells.iloc[np.argsort(group_codes(cells, CELL), kind="stable")]
+        features = feature_columns(rows, [feature for _, feature in response.levels])
+        effects, levels = [], []
+        for place, (level, _) in enumerate(response.levels[:-1]):
+            if level != CELL:
+                code = group_codes(rows, level)
+                effects.append(np.where(code[:, None] == np.unique(code), features[:, [place]], 0.0))
+                levels += [place] * effects[-1].shape[1]
+        starts = np.unique(group_codes(rows, CELL), return_index=True)[1]
+        inner = [place for place, (level, _) in enumerate(response.levels) if level == CELL]
+        return cls(
+            response_values(response, rows),
+            feature_columns(rows, response.features),
+            feature_columns(rows, ["p"])[:, 0],
+            np.hstack(effects),
+            np.array(levels),
+            starts,
+            np.diff([*starts, len(rows)]),
+            features[starts][:, inner] ** 2,
+        )
+
+    def sums(self, columns: Array) -> Array:
+        """Sums (cells, ...) of columns (rows, ...) over the rows of each cell."""
+        return np.asarray(np.add.reduceat(columns, self.starts, axis=0))
+
+    def whiten(self, columns: Array, shrink: Array, rest: float) -> Array:
+        """Columns (rows, K) times the inverse root of the covariance of cells and rows."""
+        means = self.sums(columns) / self.counts[:, None]
+        return (columns - np.repeat(shrink[:, None] * means, self.counts, axis=0)) / np.sqrt(rest)
+
+
+def fit_hierarchy(
+    response: Response, cells: pd.DataFrame, start: Hierarchy | None = None, rounds: int = 100
+) -> Hierarchy:
+    """Fit a response to the cells of many ships by restricted maximum likelihood and Gaussian priors.
+
+    Each round is a step of Gauss and Newton for theta and one of minorisation and maximisation for the variances
+    (Zhou et al., Journal of Computational and Graphical Statistics 28 (2019) 350), which never lowers the likelihood:
+
+        s <- s sqrt(r' V^-1 K V^-1 r / tr(P K)),    r = y - mean,    P = V^-1 - V^-1 J C J' V^-1
+
+    start : a fit to begin with. rounds : at most; they end where no standard deviation changes by more than 1 %.
+    """
+    every = response_rows(response, cells)
+    ships = [_Design.of(response, part) for _, part in every.groupby("ship", sort=False)]
+    centre, widths = prior_of(response)
+    theta = start.theta if start else centre
+    variances = start.variances if start else np.full(len(response.levels), 0.03)
+    for _ in range(rounds):
+        theta, covariance, factor = _improve(response, ships, theta, variances, centre, np.diag(widths**-2))
+        variances = np.maximum(variances * factor, 1e-8)
+        if np.abs(np.log(factor[variances > 1e-4])).max(initial=0.0) < 0.02:
+            break
+    return Hierarchy(response, theta, covariance, variances, len(ships))
+
+
+def prior_of(response: Response) -> tuple[Array, Array]:
+    """Means and standard deviations (P,) of the Gaussian priors of theta."""
+    widths = [NARROW if name.split(":")[0] in FLAWS and response.floored else WIDE for name in response.features]
+    return np.array([*[0.0] * len(widths), *[-1.0] * response.floored]), np.array([*widths, *[1.0] * response.floored])
+
+
+def _improve(
+    response: Response, ships: Sequence[_Design], theta: Array, variances: Array, centre: Array, prior: Array
+) -> tuple[Array, Array, Array]:
+    """Theta after one step, its covariance, and the factors (levels,) of the variances."""
+    inner = np.array([level == CELL for level, _ in response.levels])
+    rest, normal, right, solved = variances[-1], prior.copy(), prior @ (centre - theta), []
+    for ship in ships:
+        within = ship.weights @ variances[inner]
+        shrink = 1 - np.sqrt(rest / (rest + ship.counts * within))
+        mean, jacobian = mean_of_features(response, theta, ship.features, ship.floor)
+        joined = ship.whiten(np.column_stack([ship.effects, jacobian, ship.values - mean]), shrink, rest)
+        effects, plain = np.split(joined, [ship.effects.shape[1]], axis=1)
+        scaled = effects * np.sqrt(variances[ship.levels])
+        root = np.linalg.cholesky(np.eye(scaled.shape[1]) + scaled.T @ scaled)
+        taken = np.linalg.solve(root, scaled.T).T
+        slopes = plain - taken @ (taken.T @ plain)
+        normal += plain[:, :-1].T @ slopes[:, :-1]
+        right += slopes[:, :-1].T @ plain[:, -1]
+        solved.append((ship, effects, taken, slopes, within, shrink))
+    covariance = np.linalg.inv(normal)
+    step, spread = covariance @ right, np.linalg.cholesky(covariance)
+    quadratic, trace = np.zeros((2, len(variances)))
+    for ship, effects, taken, slopes, within, shrink in solved:
+        residual = slopes[:, -1:] - slopes[:, :-1] @ step[:, None]
+        taken = np.hstack([taken, slopes[:, :-1] @ spread])
+        np.add.at(quadratic, ship.levels, (effects.T @ residual)[:, 0] ** 2)
+        np.add.at(trace, ship.levels, (effects**2).sum(axis=0) - ((taken.T @ effects) ** 2).sum(axis=0))
+        residual, taken = (ship.whiten(one, shrink, rest) for one in (residual, taken))
+        total = rest + ship.counts * within
+        quadratic[inner] += ship.weights.T @ ship.sums(residual)[:, 0] ** 2
+        trace[inner] += ship.weights.T @ (ship.counts / total - (ship.sums(taken) ** 2).sum(axis=1))
+        quadratic[-1] += (residual**2).sum()
+        trace[-1] += ((ship.counts - 1 + rest / total) / rest).sum() - (taken**2).sum()
+    return theta + step, covariance, np.sqrt(quadratic / trace)
+
+
+@dataclass(frozen=True)
+class UnseenShip:
+    """A ship that the law has not seen: length [m], service speed [m/s] and, where they are known, what it meets.
+
+    baseline, floor : errors [m] of constant u, v, r and of the true physics over the horizon that is asked for; drawn
+        from the ships of the law where they are not known. sea : calm, ordinary or rough: the third of the ships of the
+        law, by floor / baseline, from which the floor is drawn; empty: all.
+    """
+
+    length: float
+    speed: float
+    baseline: float | None = None
+    floor: float | None = None
+    sea: str = ""
+
+    @property
+    def froude(self) -> float:
+        """Speed / sqrt(g length)."""
+        return float(self.speed / np.sqrt(GRAVITY * self.length))
+
+
+@dataclass(frozen=True)
+class ExchangeLaw:
+    """The law, learned from many ships.
+
+    parts : response -> its fit. limits : column -> least and greatest of the cells that it learned from; A in ship
+    lengths. provenance : of the cells. own : cells of the ship that it is asked about, which condition it.
+    """
+
+    parts: Mapping[str, Hierarchy]
+    limits: Mapping[str, tuple[float, float]]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    own: pd.DataFrame | None = None
+
+    def given(self, own: pd.DataFrame) -> ExchangeLaw:
+        """The law of one ship, of which some cells are known: what `expect` draws agrees with them."""
+        return replace(self, own=check_cells(own))
+
+    def expect(
+        self, ship: UnseenShip, foundation: Physics, amounts: Sequence[int], ahead: float, draws: int, seed: int = 0
+    ) -> Array:
+        """Predictive draws (draws, amounts) of H [m]; see `expect_all`."""
+        return self.expect_all(ship, [foundation], amounts, ahead, draws, seed)[:, 0]
+
+    def expect_all(
+        self,
+        ship: UnseenShip,
+        foundations: Sequence[Physics],
+        amounts: Sequence[int],
+        ahead: float,
+        draws: int,
+        seed: int = 0,
+    ) -> Array:
+        """Predictive draws (draws, foundations, amounts) of H [m]; each draw is one ship with all its cells.
+
+        foundations : kind, A [m], or both, of a physics; or the name of one in `own`. A alone is of any kind of error.
+        amounts : runs; 0 is the physics alone. ahead : horizon [ship lengths].
+
+        Draws are Student's, with as many degrees of freedom as there are ships beyond the effects of each. Raises
+        ShipidError for a foundation that is no kind.
+        """
+        rng, own = np.random.default_rng(seed), self._own_rows()
+        cells = _cells_to_draw(ship, foundations, ahead, own)
+        many = cells.loc[np.tile(cells.index, draws)].reset_index(drop=True)
+        many["kind"] = many["kind"].where(many["kind"] != "", rng.choice(FLAWS, len(many)))
+        for name in ("baseline", "floor", "A"):
+            unknown = cells[name].isna() & (cells["kind"] != "none" if name == "A" else True)
+            values = self._draw(name, cells[unknown], many[np.tile(unknown, draws)], draws, rng, sea=ship.sea)
+            many.loc[np.tile(unknown, draws), name] = values.ravel()
+            cells.loc[unknown, name] = np.median(values, axis=0)
+        taught = np.array([amount for amount in amounts if amount > 0])
+        asked, each = (
+            one.loc[one.index.repeat(len(taught))].assign(N_D=np.tile(taught, len(one))) for one in (cells, many)
+        )
+        alone = many["A"].fillna(many["baseline"]).to_numpy().reshape(draws, -1, 1)
+        result = np.repeat(alone, len(amounts), axis=2)
+        shape = (draws, len(cells), len(taught))
+        result[:, :, np.array(amounts) > 0] = self._draw("H", asked, each, draws, rng, own).reshape(shape)
+        return result
+
+    def _draw(
+        self,
+        name: str,
+        cells: pd.DataFrame,
+        many: pd.DataFrame,
+        draws: int,
+        rng: np.random.Generator,
+        own: pd.DataFrame | None = None,
+        sea: str = "",
+    ) -> Array:
+        """Draws (draws, rows) of a response of cells; `many` has their rows once for each draw, with what was drawn."""
+        part = self.parts[name]
+        mean = part.mean(many)[0].reshape(draws, -1)
+        deviation = part.deviations(cells, len(SEAS) * draws if name == "floor" and sea else draws, rng, own)
+        if len(deviation) > draws:
+            third = np.array_split(np.argsort(deviation[:, 0]), len(SEAS))[SEAS.index(sea)]
+            deviation = deviation[rng.permutation(third)]
+        return np.asarray(np.exp(mean + deviation) * many[part.response.unit].to_numpy().reshape(draws, -1))
+
+    def _own_rows(self) -> pd.DataFrame | None:
+        """Cells of the own ship with runs, their floor filled with what the law expects where it is not known."""
+        if self.own is None:
+            return None
+        own = self.own.assign(ship=ASKED)
+        unknown = own["floor"].isna()
+        if unknown.any():
+            mean = self.parts["floor"].mean(own.assign(floor=own["baseline"]))[0]
+            own["floor"] = own["floor"].fillna(own["baseline"] * np.exp(mean))
+        return own
+
+
+def _cells_to_draw(
+    ship: UnseenShip, foundations: Sequence[Physics], ahead: float, own: pd.DataFrame | None
+) -> pd.DataFrame:
+    """A row for each foundation; A, baseline and floor are NaN where they are to be drawn."""
+    here = pd.DataFrame(columns=["foundation"]) if own is None else own[np.isclose(own["ahead"], ahead)]
+    same: dict[str, Any] = {"ship": ASKED, "ahead": ahead, "N_D": 0, "length": ship.length, "froude": ship.froude}
+    same |= {
+        name: np.nan if value is None else value for name, value in (("baseline", ship.baseline), ("floor", ship.floor))
+    }
+    if len(here):
+        same |= {name: here[name].iloc[0] for name in ("baseline", "floor")}
+    rows = []
+    for foundation in foundations:
+        known = here[here["foundation"] == foundation]
+        kind, error = foundation if isinstance(foundation, tuple) else (foundation, np.nan)
+        if len(known):
+            kind, error = known["kind"].iloc[0], known["A"].iloc[0]
+        elif not isinstance(kind, str):
+            kind, error = "", float(kind)
+        elif kind not in CELL_KINDS:
+            raise ShipidError(f"{kind!r} is no kind: give one of {', '.join(CELL_KINDS)}", path="kind")
+        rows.append({**same, "foundation": str(foundation), "kind": kind, "A": error})
+    return pd.DataFrame(rows)
+
+
+def fit_law(cells: pd.DataFrame, start: ExchangeLaw | None = None, rounds: int = 100) -> ExchangeLaw:
+    """Fit the law to the cells of many ships; see `fit_hierarchy`."""
+    cells = check_cells(cells)
+    parts = {
+        name: fit_hierarchy(response, cells, start.parts[name] if start else None, rounds)
+        for name, response in RESPONSES.items()
+    }
+    sizes = cells.assign(A=cells["A"] / cells["length"])
+    limits = {name: (float(sizes[name].min()), float(sizes[name].max())) for name in LIMITED}
+    return ExchangeLaw(parts, limits)
+
+
+def save_law(law: ExchangeLaw, file: Path) -> None:
+    """Write a law as JSON: of each response theta, covariance, variances and ships, then limits and provenance."""
+    parts = {
+        name: {
+            "features": list(part.response.features),
+            "levels": [" : ".join(level) for level in part.response.levels],
+        }
+        | {key: _round_numbers(getattr(part, key)) for key in ("theta", "covariance", "variances")}
+        | {"ships": part.ships}
+        for name, part in law.parts.items()
+    }
+    write_json(file, {"parts": parts, "limits": law.limits, "provenance": law.provenance})
+
+
+def _round_numbers(values: Array) -> list[Any]:
+    """Numbers of an array, rounded, as nested lists."""
+    return [_round_numbers(one) if np.ndim(one) else float(f"{one:.{LAW_DIGITS}g}") for one in values]
+
+
+def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
+    """Read the law that comes with shipid, or another one; ResultError for a file of other features or none."""
+    content, parts = read_json(file), {}
+    try:
+        for name, response in RESPONSES.items():
+            part = content["parts"][name]
+            if part["features"] != list(response.features):
+                raise ResultError("has other features than this version of shipid: fit it anew", file=file, path=name)
+            theta, covariance, variances = (np.array(part[key], float) for key in ("theta", "covariance", "variances"))
+            parts[name] = Hierarchy(response, theta, covariance, variances, part["ships"])
+        limits = {name: (float(low), float(high)) for name, (low, high) in content["limits"].items()}
+        return ExchangeLaw(parts, limits, content["provenance"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultError(f"is no law of exchange ({error!r})", file=file) from None

@@ -1,0 +1,159 @@
+"""The law of exchange: it finds the law that cells are drawn from, and its intervals hold on ships not seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipid.errors import ResultError, ShipidError
+from shipid.exchange.law import (
+    RESPONSES,
+    SEAS,
+    UnseenShip,
+    fit_hierarchy,
+    fit_law,
+    prior_of,
+    read_law,
+    response_rows,
+    response_values,
+    save_law,
+)
+from tests.exchange.drawn_cells import TRUE_SPREAD, TRUE_THETA, draw_cells, true_law
+
+KINDS = ("nominal", "damping", "mass", "thrust", "moderate", "high", "none")
+
+
+@pytest.fixture(scope="module")
+def cells():
+    return draw_cells(16, 1, KINDS)
+
+
+@pytest.fixture(scope="module")
+def law(cells):
+    return fit_law(cells)
+
+
+def test_it_finds_the_law_that_cells_are_drawn_from(law):
+    fit, true = law.parts["H"], true_law()
+    apart = (fit.theta - true.theta) / np.sqrt(np.diag(fit.covariance))
+    assert np.sqrt(np.mean(apart**2)) < 1.4
+    assert np.abs(fit.theta - true.theta)[fit.response.features.index("a")] < 0.05 * TRUE_THETA["a"] + 0.03
+    spread = dict(zip(fit.response.levels, np.sqrt(fit.variances), strict=True))
+    for level, true_spread in TRUE_SPREAD.items():
+        assert spread[level] == pytest.approx(true_spread, rel=0.5), level
+    assert spread["ship foundation N_D ahead", "1"] == pytest.approx(0.05, rel=0.1)
+    assert spread["ship", "h"] < 0.03
+
+
+def test_the_fit_solves_the_normal_equations_of_dense_matrices(law, cells):
+    """The sums by cell and the small matrices of `fit_hierarchy` against the covariance of each ship, inverted."""
+    for fit in law.parts.values():
+        centre, widths = prior_of(fit.response)
+        normal, right = np.diag(widths**-2), (centre - fit.theta) / widths**2
+        for _, rows in response_rows(fit.response, cells).groupby("ship"):
+            mean, jacobian = fit.mean(rows)
+            inverse = np.linalg.inv(fit.spread(rows, 0 * jacobian))
+            normal += jacobian.T @ inverse @ jacobian
+            right += jacobian.T @ inverse @ (response_values(fit.response, rows) - mean)
+        errors = np.sqrt(np.diag(fit.covariance))
+        assert np.abs(np.linalg.solve(normal, right) / errors).max() < 0.1  # what the last step left
+        assert np.sqrt(np.diag(np.linalg.inv(normal))) == pytest.approx(errors, rel=0.05)
+
+
+def test_the_variances_stand_where_the_restricted_likelihood_is_greatest(law, cells):
+    fit = law.parts["floor"]
+
+    def loss(variances):
+        one = replace(fit, variances=variances)
+        total, normal = 0.0, np.diag(prior_of(fit.response)[1] ** -2)
+        for _, rows in response_rows(fit.response, cells).groupby("ship"):
+            mean, jacobian = fit.mean(rows)
+            spread = one.spread(rows, 0 * jacobian)
+            apart = response_values(fit.response, rows) - mean
+            total += np.linalg.slogdet(spread)[1] + apart @ np.linalg.solve(spread, apart)
+            normal += jacobian.T @ np.linalg.solve(spread, jacobian)
+        return total + np.linalg.slogdet(normal)[1]
+
+    best = loss(fit.variances)
+    assert loss(fit.variances * [1.5, 1, 1]) > best
+    assert loss(fit.variances * [0.67, 1, 1]) > best
+
+
+def test_units_and_the_order_of_rows_do_not_matter(law, cells):
+    metres = ["A", "H", "baseline", "floor", "length"]
+    other = cells.sample(frac=1, random_state=3)
+    other[metres] *= 10.0
+    other = fit_hierarchy(RESPONSES["H"], other)
+    assert other.theta == pytest.approx(law.parts["H"].theta, abs=1e-6)
+
+
+def covered(draws, true, level):
+    low, high = np.quantile(draws, [(1 - level) / 2, (1 + level) / 2], axis=0)
+    return float(((low <= true) & (true <= high)).mean())
+
+
+@pytest.mark.parametrize("known", [0, 3], ids=["before any run", "after three amounts"])
+def test_intervals_hold_on_ships_that_it_has_not_seen(law, known):
+    shares = []
+    for _, ship in draw_cells(24, 2, KINDS).groupby("ship"):
+        rows = ship[ship["ahead"] == 2.0].sort_values(["foundation", "N_D"])
+        amounts = sorted(set(rows["N_D"]))
+        asked = UnseenShip(*rows[["length", "speed", "baseline", "floor"]].iloc[0])
+        own = rows[rows["N_D"].isin(amounts[:known])]
+        one = law.given(own) if known else law
+        names = list(dict.fromkeys(rows["foundation"]))
+        first = rows.drop_duplicates("foundation")
+        kinds = names if known else [*zip(first["kind"], first["A"], strict=True)]
+        draws = one.expect_all(asked, kinds, amounts[known:], 2.0, 500)
+        true = rows["H"].to_numpy().reshape(len(names), -1)[:, known:]
+        shares.append([covered(draws, true, level) for level in (0.95, 0.5)])
+    wide, narrow = np.mean(shares, axis=0)
+    assert 0.90 < wide < 0.995
+    assert 0.37 < narrow < 0.63
+
+
+def test_known_cells_are_repeated_and_a_surprising_ship_is_less_certain(law, cells):
+    ship = cells[(cells["ship"] == "ship-3") & (cells["ahead"] == 1.0)]
+    own, asked = ship[ship["N_D"] <= 4], UnseenShip(100.0, 7.0)
+    known = own[own["foundation"] == "mass-2"].set_index("N_D")
+    draws = law.given(own).expect(asked, "mass-2", [0, 1, 2, 4], 1.0, 50)
+    assert draws == pytest.approx(np.broadcast_to([known["A"].iloc[0], *known["H"]], draws.shape), rel=1e-4)
+    wild = own.assign(H=own["H"] * np.exp(np.resize([-1, 1, 0, 2], len(own))))
+    widths = [np.log(law.given(one).expect(asked, "mass-2", [64], 1.0, 500)).std() for one in (own, wild)]
+    assert widths[1] > 2 * widths[0]
+
+
+def test_no_runs_give_the_physics_alone_and_the_same_ship_stands_behind_all_foundations(law):
+    asked = UnseenShip(100.0, 7.0, baseline=50.0)
+    draws = law.expect_all(asked, [40.0, "none", "high"], [0, 16], 2.0, 2000)
+    assert (draws[:, 0, 0] == 40.0).all()
+    assert (draws[:, 1, 0] == 50.0).all()
+    assert draws[:, 2, 0].std() > 0
+    assert np.corrcoef(np.log(draws[:, :2, 1].T))[0, 1] > 0.3
+    assert (law.expect(asked, 40.0, [0, 16], 2.0, 2000) > 0).all()
+
+
+def test_a_rougher_sea_has_a_higher_floor(law):
+    asked = [UnseenShip(100.0, 7.0, baseline=50.0, sea=sea) for sea in SEAS]
+    middle = [np.median(law.expect(one, "nominal", [0, 32], 2.0, 1000), axis=0) for one in asked]
+    assert (np.diff(middle, axis=0) > 0).all()
+
+
+def test_a_law_is_written_and_read(law, tmp_path):
+    save_law(law, tmp_path / "law.json")
+    asked, other = UnseenShip(100.0, 7.0), read_law(tmp_path / "law.json")
+    one, two = (each.expect(asked, "template", [0, 4], 2.0, 100) for each in (law, other))
+    assert np.quantile(two, [0.1, 0.5, 0.9]) == pytest.approx(np.quantile(one, [0.1, 0.5, 0.9]), rel=1e-3)
+    assert other.limits == law.limits
+    text = (tmp_path / "law.json").read_text()
+    for words in ("{}", "[1]", text.replace('"a:n"', '"a:p"'), text.replace('"limits"', '"limit"')):
+        (tmp_path / "law.json").write_text(words)
+        with pytest.raises(ResultError, match=r"law\.json: "):
+            read_law(tmp_path / "law.json")
+
+
+def test_a_foundation_that_is_no_kind_is_refused(law):
+    with pytest.raises(ShipidError, match="'guess' is no kind: give one of nominal"):
+        law.expect(UnseenShip(100.0, 7.0), "guess", [1], 2.0, 10)
