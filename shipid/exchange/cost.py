@@ -147,7 +147,7 @@ class Ways:
     def reach(self) -> Array:
         """(F, K) chance that a way errs by no more than the goal; NaN where there is no way, or no goal."""
         known = np.isfinite(self.error) & (self.cost.H_end_required is not None)
-        return np.where(known, self.good, np.nan).mean(axis=0)
+        return np.asarray(np.where(known, self.good, np.nan).mean(axis=0))
 
     def best(self, place: int | None = None) -> tuple[int, int]:
         """Places (f, k) of the best way, or of the best one with one physics.
@@ -166,7 +166,7 @@ class Ways:
         """A row per way that there is: foundation, N_D, price, H_end, low, high, probability, expected loss.
 
         H_end is the median of the error [m], low and high its 95 % interval. chosen : the best of its foundation.
-        frontier : no way with a lower error is as cheap. unit, goal [m] : of all rows.
+        frontier : every cheaper way has a larger error. unit, goal [m] : of all rows.
         """
         known = np.isfinite(self.error).all(axis=0)
         low, middle, high = np.quantile(np.where(known, self.error, 1.0), [0.025, 0.5, 0.975], axis=0)
@@ -176,9 +176,9 @@ class Ways:
         columns = {"foundation": names, "N_D": amounts, "price": self.price, "H_end": middle, "low": low, "high": high}
         columns |= {"probability": self.reach, "expected": self.expected, "chosen": chosen}
         frame = pd.DataFrame({name: values[known] for name, values in columns.items()})
-        best = frame.sort_values(["price", "H_end"])["H_end"].cummin().reindex(frame.index)
-        goal = self.cost.H_end_required
-        return frame.assign(frontier=frame["H_end"] <= best, unit=self.cost.unit, goal=np.nan if goal is None else goal)
+        cheaper = frame.sort_values(["price", "H_end"])["H_end"].cummin().shift(fill_value=np.inf).sort_index()
+        goal = np.nan if self.cost.H_end_required is None else self.cost.H_end_required
+        return frame.assign(frontier=frame["H_end"] < cheaper, unit=self.cost.unit, goal=goal)
 
     def sentences(self) -> list[str]:
         """What to buy, what the next runs and other physics would change, and when to stop."""

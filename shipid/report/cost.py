@@ -13,6 +13,7 @@ from shipid.report.figure import (
     Chip,
     PageFigure,
     Panel,
+    Trace,
     category_colour,
     escape_name,
     log_axis,
@@ -72,7 +73,7 @@ def _draw_frontier(ways: pd.DataFrame) -> Panel:
             for row in rows_as_tuples(mine)
         ]
         ring = {"color": colour, "size": 8, "line": {"color": INK, "width": 2 * mine["frontier"]}}
-        style = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5}, "marker": ring}
+        style: Trace = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5}, "marker": ring}
         traces.append(make_line(name, mine["price"], mine["H_end"], [f"way:{name}"], hover=words, **style))
     if np.isfinite(goal := ways["goal"].iloc[0]):
         dashed = {"color": MUTED, "dash": "dash", "width": 1.5}

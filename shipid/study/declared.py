@@ -311,7 +311,12 @@ def check_claims(study: Study, models: Sequence[Foundation]) -> None:
 
 def check_cost(study: Study, models: Sequence[Foundation]) -> None:
     """Refuse the price of physics that is no family of the study and no kind of the law of exchange."""
-    known = {*KINDS_OF_PHYSICS, *(model.family for model in models if model.base is not None)}
+    known = {
+        *KINDS_OF_PHYSICS,
+        "model-test",
+        "identified",
+        *(model.family for model in models if model.base is not None),
+    }
     for name in study.cost.foundations if study.cost else ():
         if name not in known:
             words = f"{name!r} is no family of this study and no kind of physics: {suggest_name(name, known)}"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shipid.exchange.cost import Ways
-from shipid.study.schema import Cost
+from shipid import figures
+from shipid.answer.pages import report_content
+from shipid.exchange.cost import Ways, cost_frame, cost_sentences, study_ways
+from shipid.study.results import Results, read_results
+from shipid.study.schema import Cost, Data
 
 AMOUNTS = np.array([0.0, 1, 2, 4, 8, 16, 32, 64, 100])
 NAMES = ("none", "template", "model test")
@@ -126,3 +130,55 @@ def test_the_table_has_a_row_for_each_way_that_there_is() -> None:
     assert (table["low"] <= table["H_end"]).all()
     assert (table["H_end"] <= table["high"]).all()
     assert table.groupby("foundation")["probability"].apply(lambda p: p.is_monotonic_increasing).all()
+
+
+def with_cost(run: Path, **goal: float) -> Results:
+    """Results of a run, as if its study had costs."""
+    results = read_results(run)
+    block = Cost(unit="EUR", run=20.0, foundations={"wrong": 40.0, "sister": 5.0}, **goal)
+    return replace(results, plan=replace(results.plan, study=results.plan.study.model_copy(update={"cost": block})))
+
+
+def test_the_ways_of_a_study_agree_with_its_cells(tiny_run: Path) -> None:
+    """Errors at amounts that were run are those of the study, up to one factor from the mean to the end."""
+    results = with_cost(tiny_run, H_end_required=1.0)
+    ways = study_ways(results)
+    assert ways.foundations == ["none", "wrong", "sister"]
+    known = results.cells[results.cells["foundation"] == "none"].set_index("N_D")["H"]
+    factor = (results.cells["H_end"] / results.cells["H"]).median()
+    for amount, H in known.items():
+        place = list(ways.amounts).index(amount)
+        np.testing.assert_allclose(ways.error[:, 0, place], H * factor, rtol=0.02)
+    widths = np.log(ways.error[:, 1:, 4]).std(axis=0)
+    assert widths[1] > widths[0], "physics that was not tried is less known"
+
+
+@pytest.mark.parametrize("goal", [{"per_metre": 100.0}, {"H_end_required": 1.0}, {"H_end_required": 1e-6}], ids=str)
+def test_a_study_says_what_to_buy(tiny_run: Path, goal: dict[str, float]) -> None:
+    content = report_content(with_cost(tiny_run, **goal))
+    said = [one.text for one in content.answer if one.figure == "frontier"]
+    first = {"per_metre": "The cheapest way in all", "H_end_required": "The cheapest way to 1.00 m at the horizon"}
+    start = "No way that was tried is likely" if goal == {"H_end_required": 1e-6} else first[next(iter(goal))]
+    assert said[0].startswith(start)
+    assert "stop" in said[-1].lower()
+    assert all("EUR" in one for one in said[:-1])
+    assert figures.frontier(content).data
+
+
+def test_a_study_without_costs_says_nothing_and_one_without_a_length_says_why(tiny_run: Path) -> None:
+    results = read_results(tiny_run)
+    assert cost_sentences(results) == []
+    assert cost_frame(results).empty
+    priced = with_cost(tiny_run, per_metre=1.0)
+    bare = replace(priced, plan=replace(priced.plan, vessels={}))
+    assert cost_frame(bare).empty
+    assert cost_sentences(bare)[0].startswith("What to buy cannot be said: the law needs a vessel")
+
+
+def test_recorded_runs_are_paid(tiny_run: Path) -> None:
+    """The same runs as a log: those that may train are there, and a study begins at their number."""
+    results = with_cost(tiny_run, per_metre=1.0)
+    study = results.plan.study.model_copy(update={"truth": None, "data": Data(dataset="runs.parquet")})
+    ways = study_ways(replace(results, plan=replace(results.plan, study=study)))
+    assert ways.amounts[0] == results.pool == 8
+    assert ways.price[0, 0] == 0
