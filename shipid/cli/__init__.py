@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 import shipid
-from shipid.cli import data, family, identify, predict, simulation, study, vessel
+from shipid.cli import data, expect, family, identify, predict, simulation, study, vessel
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError, is_utf_8
@@ -30,6 +30,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "manoeuvre": simulation.manoeuvre_command,
     "replay": simulation.replay_command,
     "identify": identify.identify_command,
+    "expect": expect.expect_command,
     "predict": predict.predict_command,
     "export": predict.export_command,
     "aboard": predict.aboard_command,

@@ -42,12 +42,12 @@ def read_cell_table(file: Path) -> pd.DataFrame:
 
 
 def check_cells(cells: pd.DataFrame, file: Path | None = None) -> pd.DataFrame:
-    """Cells with a finite H, their values checked as those of `read_cell_table`."""
+    """Cells with a finite H, their values checked as those of `read_cell_table`; an empty kind is not known."""
     if missing := [name for name in CELL_COLUMNS if name not in cells]:
         raise DataError(
             f"missing: a table of cells has the columns {', '.join(CELL_COLUMNS)}", file=file, path=missing[0]
         )
-    if strange := sorted({*cells["kind"]} - {*CELL_KINDS}):
+    if strange := sorted({*cells["kind"]} - {*CELL_KINDS, ""}):
         raise DataError(f"{strange[0]!r} is no kind: give one of {', '.join(CELL_KINDS)}", file=file, path="kind")
     cells = cells[np.isfinite(cells["H"])]
     least = {name: cells[name].min() for name in NUMBERS}

@@ -155,5 +155,5 @@ def test_a_law_is_written_and_read(law, tmp_path):
 
 
 def test_a_foundation_that_is_no_kind_is_refused(law):
-    with pytest.raises(ShipidError, match="'guess' is no kind: give one of nominal"):
+    with pytest.raises(ShipidError, match="'guess' is no kind: give one of model-test"):
         law.expect(UnseenShip(100.0, 7.0), "guess", [1], 2.0, 10)

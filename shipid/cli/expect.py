@@ -1,0 +1,68 @@
+"""`shipid expect`: the error that the law of exchange expects, before there are data or with more runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shipid.arguments import check_choice
+from shipid.cli.answer import Json, open_answer
+from shipid.errors import ShipidError
+
+HEADS = {"physics": "physics", "N_D": "runs", "H": "H [m]", "low": "95 % from", "high": "to"}
+
+
+def expect_command(
+    length: Annotated[float | None, typer.Option(help="m, between perpendiculars")] = None,
+    speed: Annotated[float | None, typer.Option(help="m/s, in service")] = None,
+    vessel: Annotated[
+        str | None, typer.Option(help="bundled name or file, instead of --length and --speed: it is simulated")
+    ] = None,
+    study: Annotated[Path | None, typer.Option(help="folder of a run: its cells condition the law")] = None,
+    kind: Annotated[
+        list[str] | None, typer.Option(help="template, sister, identified, model-test, none, ...; may be repeated")
+    ] = None,
+    a: Annotated[
+        float | None, typer.Option("--A", help="m, mean error of the physics alone, of one --kind or any")
+    ] = None,
+    runs: Annotated[list[int] | None, typer.Option(min=0, help="that train; may be repeated")] = None,
+    ahead: Annotated[float, typer.Option(min=0.01, help="ship lengths at 0.75 of the service speed")] = 2.0,
+    sea: Annotated[str, typer.Option(help="calm, ordinary or rough: a third of the ships; default: all")] = "",
+    law: Annotated[Path | None, typer.Option(help="another law.json")] = None,
+    as_json: Json = False,
+) -> None:
+    """Say what error to expect from a kind of physics and a number of runs, with its 95 % interval."""
+    from shipid.exchange import expect
+    from shipid.exchange.law import SEAS, UnseenShip, read_law
+
+    exchange, amounts = read_law(law) if law else read_law(), sorted({*(runs or [4, 12, 40])})
+    if sea:
+        check_choice("--sea", sea, SEAS)
+    for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
+        if number is not None and not 0 < number < 1e6:
+            raise ShipidError(f"{number:g}: must be above 0", path=option)
+    if study is not None:
+        import shipid
+
+        cells, ship = expect.study_cells(shipid.read_results(study))
+        exchange, ahead = exchange.given(cells), float(cells["ahead"].iloc[0])
+        most = int(cells["N_D"].max())
+        amounts = amounts if runs else [most, 2 * most, 4 * most]
+        foundations = list(dict.fromkeys(cells["foundation"]))
+    else:
+        foundations = expect.likely_physics(kind, a)
+        if vessel is not None:
+            ship = expect.meet_ship(vessel, ahead, Path("expect.toml"))
+        elif length is None or speed is None:
+            raise ShipidError("missing: give --length and --speed, or --vessel, or --study", path="--length")
+        else:
+            ship = UnseenShip(length, speed, sea=sea)
+    table = expect.expected_errors(exchange, ship, foundations, amounts, ahead)
+    with open_answer(as_json) as answer:
+        sentence = expect.expectation_sentence(table.iloc[len(amounts) // 2], ship, ahead)
+        answer.say(sentence, sentence=sentence)
+        answer.warn(expect.extrapolation_sentences(exchange, ship, foundations, amounts, ahead))
+        answer.records("expected", table, HEADS)
+        answer.say(expect.LIMITS.format(**exchange.provenance), law=exchange.provenance)

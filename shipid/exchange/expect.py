@@ -1,0 +1,141 @@
+"""What error to expect before there are data, or with more runs than a study has: the law asked, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from shipid.errors import ShipidError
+from shipid.exchange.cells import CELL_KINDS
+from shipid.exchange.law import ExchangeLaw, Physics, UnseenShip
+from shipid.metrics import error_of_windows, position_error
+from shipid.simulation.approach import vessel_service_speed
+from shipid.study.declared import NO_MODEL
+from shipid.study.new import draft_study
+from shipid.study.plan import build_plan
+from shipid.study.prepare import obtain_runs, prepare
+from shipid.study.results import Results
+from shipid.units import length_text, plural_word, significant_digits
+from shipid.vessel.load import load_vessel
+
+OFFERED = ("template", "sister", "model-test", "identified", "none")
+LIMITS = "Simulated ships taught this law ({ships} of them, {cells} cells, shipid {version}); a real ship may differ."
+USUAL_SPEED = 0.75  # of the service speed: ship lengths ahead are run at it, in the ships of the law too
+RUNS_TRIED, TESTS_TRIED = 2, 20  # runs of the simulation that gives baseline and floor
+DRAWS = 4000
+
+
+def meet_ship(vessel: str, ahead: float, out: Path) -> UnseenShip:
+    """Simulate a vessel as `study new` drafts it, for baseline and floor [m] over a horizon [ship lengths].
+
+    Raises ShipidError where the vessel cannot make the truth of a study.
+    """
+    ship = load_vessel(vessel)
+    draft = draft_study([vessel], None, out).plan
+    document: dict[str, Any] = deepcopy(dict(draft.document))
+    length, speed = float(ship.length or np.nan), vessel_service_speed(ship)
+    step, before = document["prediction"]["step"], document["prediction"]["ahead"]
+    horizon = max(round(ahead * length / (USUAL_SPEED * speed) / step), 1) * step
+    document["prediction"]["ahead"] = horizon
+    document["truth"] |= {
+        "manoeuvres": RUNS_TRIED + TESTS_TRIED,
+        "duration": document["truth"]["duration"] + horizon - before,
+    }
+    document["split"]["test"], document["grid"]["N_D"] = TESTS_TRIED, [RUNS_TRIED]
+    document["family"] = [one for one in document["family"] if one["name"] == "nominal"]
+    document.pop("claims")
+    plan = build_plan(document, out, draft.vessels)
+    prepared = prepare(plan, obtain_runs(plan))
+    floor = position_error(prepared.test_paths["nominal"], prepared.test.future).mean()
+    return UnseenShip(length, speed, float(prepared.naive.mean()), float(floor))
+
+
+def study_cells(results: Results) -> tuple[pd.DataFrame, UnseenShip]:
+    """Cells of a finished study as those of the law, the mean over seeds, and its ship.
+
+    The kind of a foundation is the name of its family where that is one of `CELL_KINDS`, else unknown; the floor is A
+    of a family `nominal`. Raises ShipidError for a study without a vessel of known length.
+    """
+    vessels = [one for one in results.plan.vessels.values() if one.length]
+    if not vessels:
+        raise ShipidError("the law needs a vessel with particulars.L_pp: the study has none", file=results.folder)
+    length, speed = float(vessels[0].length or np.nan), vessel_service_speed(vessels[0])
+    cells = results.judged_cells
+    cells = cells[cells["status"] == "ok"].groupby(["foundation", "family", "N_D"], as_index=False)[["A", "H"]].mean()
+    baseline = float(error_of_windows(results.naive).mean())
+    ship = UnseenShip(length, speed, baseline)
+    nominal = cells["A"][cells["family"] == "nominal"]
+    kinds = cells["family"].where(cells["family"].isin([*CELL_KINDS]), "")
+    known: dict[str, Any] = {
+        "ship": results.plan.name, "type": "", "bundled": False, "length": length, "speed": speed,
+        "froude": ship.froude, "kind": kinds.mask(cells["foundation"] == NO_MODEL, "none"),
+        "ahead": results.test.horizon * results.test.step * USUAL_SPEED * speed / length,
+        "baseline": baseline, "floor": nominal.mean(),
+    }  # fmt: skip
+    return cells.assign(**known), ship
+
+
+def expected_errors(
+    law: ExchangeLaw, ship: UnseenShip, foundations: Sequence[Physics], amounts: Sequence[int], ahead: float
+) -> pd.DataFrame:
+    """A row for each foundation and number of runs: H, the middle, and low and high, its 95 % interval [m]."""
+    draws = law.expect_all(ship, foundations, amounts, ahead, DRAWS)
+    low, middle, high = np.quantile(draws, [0.025, 0.5, 0.975], axis=0)
+    return pd.DataFrame(
+        {"physics": foundation_text(one), "N_D": amount, "H": middle[i, j], "low": low[i, j], "high": high[i, j]}
+        for i, one in enumerate(foundations)
+        for j, amount in enumerate(amounts)
+    )
+
+
+def foundation_text(foundation: Physics) -> str:
+    """Physics in a few words."""
+    if isinstance(foundation, tuple):
+        return f"{foundation[0]}, A {length_text(foundation[1])} m"
+    return foundation if isinstance(foundation, str) else f"A {length_text(foundation)} m"
+
+
+def likely_physics(kinds: Sequence[str] | None, error: float | None) -> list[Physics]:
+    """Physics of some kinds, `OFFERED` where neither is known, or of an error A [m], of a kind or of any."""
+    if error is None:
+        return list(kinds or OFFERED)
+    if len(kinds or []) > 1:
+        raise ShipidError("A is that of one kind: give one --kind, or none", path="--A")
+    return [(kinds[0], error) if kinds else error]
+
+
+def expectation_sentence(row: pd.Series[Any], ship: UnseenShip, ahead: float) -> str:
+    """One row of `expected_errors` in a plain sentence."""
+    seconds = ahead * ship.length / (USUAL_SPEED * ship.speed)
+    low, middle, high = (significant_digits(float(row[name]), 2) for name in ("low", "H", "high"))
+    return (
+        f"With {row['N_D']} {plural_word(row['N_D'], 'run')} and this physics ({row['physics']}), expect the path to "
+        f"err by {middle} m, 95 % of ships {low} to {high} m, in the mean over the next {seconds:.3g} s "
+        f"({ahead:.3g} ship lengths)."
+    )
+
+
+def extrapolation_sentences(
+    law: ExchangeLaw, ship: UnseenShip, foundations: Sequence[Physics], amounts: Sequence[int], ahead: float
+) -> list[str]:
+    """What lies outside the ships that the law was learned from, a sentence for each."""
+    errors = [one[1] if isinstance(one, tuple) else one for one in foundations if not isinstance(one, str)]
+    values: dict[str, tuple[str, Sequence[float]]] = {
+        "length": ("length [m]", [ship.length]),
+        "froude": ("Froude number", [ship.froude]),
+        "N_D": ("runs", [amount for amount in amounts if amount > 0]),
+        "ahead": ("ship lengths ahead", [ahead]),
+        "A": ("A / length", [error / ship.length for error in errors]),
+    }
+    return [
+        f"extrapolated: {words} {value:.3g}, the ships of the law have {low:.3g} to {high:.3g}"
+        for name, (words, several) in values.items()
+        for low, high in [law.limits[name]]
+        for value in several
+        if not low * 0.98 <= value <= high * 1.02
+    ]
