@@ -229,7 +229,6 @@ def study_ways(results: Results) -> Ways:
     cost = results.plan.study.cost
     assert cost is not None
     own, ship = study_cells(results)
-    own["kind"] = own["kind"].replace("", "moderate")
     ends = results.judged_cells.query("status == 'ok'")
     if own.empty:
         raise ShipidError("no cell has a result", file=results.folder)
