@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from shipid.errors import ShipidError
 from shipid.exchange.expect import study_cells
 from shipid.exchange.law import read_law
+from shipid.metrics import error_at_horizon
 from shipid.report.content import model_text
 from shipid.report.wording import counted_text, difference_text, metres_text
 from shipid.study.declared import NO_MODEL
@@ -38,7 +39,7 @@ class Ways:
     """All ways from here on, with their prices and predictive draws of their errors.
 
     foundations : names (F,) of the physics. amounts : (K,) runs in all, rising; the first are there already.
-    error : (draws, F, K) mean error at the horizon [m]; NaN where there is no such way.
+    error : (draws, F, K) mean error at the horizon [m]; no physics without runs is constant u, v, r.
     prices : (F,) of each physics, in the unit of `cost`; 0 of what is paid already or free.
     """
 
@@ -74,7 +75,7 @@ class Ways:
         and everything where that does not help.
         """
         if self.cost.per_metre is not None:
-            return self.price + self.cost.per_metre * np.where(np.isnan(self.error), np.inf, self.error)
+            return np.asarray(self.price + self.cost.per_metre * self.error)
         last = len(self.amounts)
         good = self.good & (self.amounts > 0)
         first = np.where(good.any(axis=2), good.argmax(axis=2), last)  # (draws, F)
@@ -104,7 +105,6 @@ class Ways:
         squares = [known[:, [i]] * known[:, i:] for i in range(known.shape[1])]
         basis = np.hstack([np.ones((len(known), 1)), known, *squares])
         losses = self.losses[:, :, place:].reshape(len(known), -1)
-        losses = losses[:, np.isfinite(losses).all(axis=0)]
         values = []
         for learned, judged in ((slice(0, None, 2), slice(1, None, 2)), (slice(1, None, 2), slice(0, None, 2))):
             found = basis[judged] @ np.linalg.lstsq(basis[learned], losses[learned])[0]
@@ -145,9 +145,8 @@ class Ways:
 
     @property
     def reach(self) -> Array:
-        """(F, K) chance that a way errs by no more than the goal; NaN where there is no way, or no goal."""
-        known = np.isfinite(self.error) & (self.cost.H_end_required is not None)
-        return np.asarray(np.where(known, self.good, np.nan).mean(axis=0))
+        """(F, K) chance that a way errs by no more than the goal; NaN without a goal."""
+        return np.asarray(self.good.mean(axis=0) if self.cost.per_metre is None else np.full(self.price.shape, np.nan))
 
     def best(self, place: int | None = None) -> tuple[int, int]:
         """Places (f, k) of the best way, or of the best one with one physics.
@@ -157,25 +156,23 @@ class Ways:
         one = np.full(len(self.prices), place is None)[:, None] | (np.arange(len(self.prices)) == place)[:, None]
         rank = self.expected
         if self.cost.per_metre is None:
-            reach = np.nan_to_num(self.reach, nan=-1.0)
-            rank = np.where(reach >= PROBABLE, self.price, (2 - reach) * (1 + self.price.max()))
+            rank = np.where(self.reach >= PROBABLE, self.price, (2 - self.reach) * (1 + self.price.max()))
         f, k = np.unravel_index(np.where(one, rank, np.inf).argmin(), rank.shape)
         return int(f), int(k)
 
     def table(self) -> pd.DataFrame:
-        """A row per way that there is: foundation, N_D, price, H_end, low, high, probability, expected loss.
+        """A row per way: foundation, N_D, price, H_end, low, high, probability, expected loss.
 
         H_end is the median of the error [m], low and high its 95 % interval. chosen : the best of its foundation.
         frontier : every cheaper way has a larger error. unit, goal [m] : of all rows.
         """
-        known = np.isfinite(self.error).all(axis=0)
-        low, middle, high = np.quantile(np.where(known, self.error, 1.0), [0.025, 0.5, 0.975], axis=0)
-        chosen = np.zeros(known.shape, dtype=bool)
+        low, middle, high = np.quantile(self.error, [0.025, 0.5, 0.975], axis=0)
+        chosen = np.zeros(middle.shape, dtype=bool)
         chosen[tuple(np.transpose([self.best(place) for place in range(len(self.prices))]))] = True
         names, amounts = np.meshgrid(list(self.foundations), self.amounts.astype(int), indexing="ij")
         columns = {"foundation": names, "N_D": amounts, "price": self.price, "H_end": middle, "low": low, "high": high}
         columns |= {"probability": self.reach, "expected": self.expected, "chosen": chosen}
-        frame = pd.DataFrame({name: values[known] for name, values in columns.items()})
+        frame = pd.DataFrame({name: values.ravel() for name, values in columns.items()})
         cheaper = frame.sort_values(["price", "H_end"])["H_end"].cummin().shift(fill_value=np.inf).sort_index()
         goal = np.nan if self.cost.H_end_required is None else self.cost.H_end_required
         return frame.assign(frontier=frame["H_end"] < cheaper, unit=self.cost.unit, goal=goal)
@@ -223,7 +220,8 @@ def study_ways(results: Results) -> Ways:
     """Ways to the goal of a study that has `[cost]`, by the law given the cells of the study.
 
     Recorded runs that may train are there already. A name of `[cost.foundations]` is a family, of which each draw is
-    one member, or a kind of physics that has not been tried. Raises ShipidError where no vessel has a length, or no
+    one member, or a kind of physics that has not been tried. Whoever has runs sees what errs more than constant u, v, r
+    do, and takes these. Raises ShipidError where no vessel has a length, or no
     cell a result.
     """
     cost = results.plan.study.cost
@@ -241,7 +239,9 @@ def study_ways(results: Results) -> Ways:
     first = np.cumsum([0, *map(len, members[:-1])])
     taken = first + np.random.default_rng(0).integers([len(several) for several in members], size=(DRAWS, len(names)))
     error = drawn[np.arange(DRAWS)[:, None], taken] * float((ends["H_end"] / ends["H"]).median())
-    error[:, 0, np.array(amounts) == 0] = np.nan
+    naive, runs = float(error_at_horizon(results.naive).mean()), np.array(amounts) > 0
+    error[:, :, runs] = np.minimum(error[:, :, runs], naive)
+    error[:, 0, ~runs] = naive
     prices = np.array([0.0, *cost.foundations.values()])
     return Ways(cost, names, np.array(amounts, dtype=float), error, prices)
 

@@ -25,7 +25,7 @@ def made_ways(seed: int, goal: dict[str, float], draws: int = 400, spread: float
     one = rng.normal(size=(draws, 1, 1)) * spread
     A = np.array([12.0, 6.0, 2.5])[:, None] * np.exp(0.5 * spread * rng.normal(size=(draws, 3, 1)))
     error = np.hypot(0.6, A * (1 + AMOUNTS / (4 * np.exp(0.5 * one))) ** -(0.6 * np.exp(0.2 * one)))
-    error[:, 0, 0] = np.nan
+    error[:, 0, 0] = 15.0
     block = Cost(unit="EUR", **({"run": 1.0, "mobilisation": 5.0} | cost), **goal)
     return Ways(block, NAMES, AMOUNTS, error, np.array([0.0, 3.0, 40.0]))
 
@@ -60,7 +60,7 @@ def test_whoever_knows_the_ship_pays_the_least_that_is_possible(seed: int, goal:
     ways = made_ways(seed, goal, draws=1)
     ways, truth = replace(ways, error=np.repeat(ways.error, 60, axis=0)), ways.error[0]
     wanted = ways.cost.H_end_required
-    good = (truth <= wanted) & (AMOUNTS > 0) if wanted else np.isfinite(truth)
+    good = (truth <= wanted) & (AMOUNTS > 0) if wanted else truth > 0
     least = np.min((ways.price + (0 if wanted else ways.cost.per_metre * truth))[good])  # type: ignore[operator]
     place, spent = 0, 0.0
     while True:
@@ -77,7 +77,7 @@ def test_whoever_knows_the_ship_pays_the_least_that_is_possible(seed: int, goal:
             ways = replace(ways, amounts=ways.amounts[1:], error=ways.error[:, :, 1:])
         else:
             break
-    spent += 0.0 if wanted else ways.cost.per_metre * np.nanmin(truth[ways.prices == 0, place])  # type: ignore[operator]
+    spent += 0.0 if wanted else ways.cost.per_metre * np.min(truth[ways.prices == 0, place])  # type: ignore[operator]
     assert spent == pytest.approx(least)
 
 
@@ -97,7 +97,7 @@ def test_looking_is_worth_what_it_is_by_hand() -> None:
     """
     kind = np.tile([1.0, 1.0, 100.0, 100.0], 100)
     error = np.stack([np.repeat(kind[:, None], 2, axis=1), np.ones((400, 2))], axis=1)
-    error[:, 0, 0] = np.nan
+    error[:, 0, 0] = 100.0
     cost = Cost(unit="EUR", run=2.0, per_metre=1.0)
     ways = Ways(cost, ("none", "test"), np.array([0.0, 1.0]), error, np.array([0.0, 40.0]))
     assert ways.expected.min() == pytest.approx(41)
@@ -114,7 +114,7 @@ def test_looking_at_what_all_ships_share_is_worth_nothing(seed: int) -> None:
 
 def test_towards_a_goal_a_way_goes_on_until_it_is_seen() -> None:
     """By hand: goal 2 m; the free physics gets there with 4 runs, the test (40) with 1."""
-    error = np.repeat(np.array([[[np.nan, 9, 5, 2, 1], [1, 1, 1, 1, 1]]]), 2, axis=0)
+    error = np.repeat(np.array([[[9.0, 9, 5, 2, 1], [1, 1, 1, 1, 1]]]), 2, axis=0)
     cost = Cost(unit="EUR", run=3.0, mobilisation=10.0, H_end_required=2.0)
     ways = Ways(cost, ("none", "test"), np.array([0.0, 1, 2, 4, 8]), error, np.array([0.0, 40.0]))
     assert ways.losses[0, 0].tolist() == [22] * 5
@@ -123,10 +123,10 @@ def test_towards_a_goal_a_way_goes_on_until_it_is_seen() -> None:
     assert ways.next_step() == (1, None)
 
 
-def test_the_table_has_a_row_for_each_way_that_there_is() -> None:
+def test_the_table_has_a_row_for_each_way() -> None:
     ways = made_ways(1, GOALS[1])
     table = ways.table()
-    assert len(table) == 3 * len(AMOUNTS) - 1
+    assert len(table) == 3 * len(AMOUNTS)
     assert (table["low"] <= table["H_end"]).all()
     assert (table["H_end"] <= table["high"]).all()
     assert table.groupby("foundation")["probability"].apply(lambda p: p.is_monotonic_increasing).all()

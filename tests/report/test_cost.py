@@ -19,7 +19,7 @@ NASTY = "<b>sister</b>"
 
 def priced(content: ReportContent, **goal: float) -> ReportContent:
     """Content with three kinds of physics and four amounts: 2 m at 8 runs, a run for 10, a sister for 35."""
-    error = np.array([[np.nan, 8, 4, 2], [9, 4, 3, 2], [3, 2.5, 2, 1]])
+    error = np.array([[12, 8, 4, 2], [9, 4, 3, 2], [3, 2.5, 2, 1]])
     block = Cost(unit="h", run=10.0, mobilisation=20.0, **goal)
     prices, amounts = np.array([0.0, 5.0, 35.0]), np.array([0.0, 2, 4, 8])
     ways = Ways(block, ("none", "template", NASTY), amounts, error * np.array([[[0.9]], [[1.0]], [[1.1]]]), prices)
@@ -34,12 +34,12 @@ def test_each_way_is_a_point_at_its_price_and_those_of_the_frontier_have_a_ring(
     figure = cost.frontier_figure(content)
     (panel,) = views(figure).values()
     none, template, sister, *rest = panel[0].data
-    assert np.array(none.x).tolist() == [40, 60, 100]
+    assert np.array(none.x).tolist() == [0, 40, 60, 100]
     np.testing.assert_allclose(np.array(sister.y), [3, 2.5, 2, 1])
     assert np.array(template.marker.line.width).tolist() == [2, 0, 0, 0]
     assert np.array(sister.marker.line.width).tolist() == [2, 2, 2, 2]
     assert len(rest) == ("H_end_required" in goal)
-    assert figure.takeaway == "From 9.00 m for 5 h to 1.00 m for 135 h."
+    assert figure.takeaway == "From 12.0 m for 0 h to 1.00 m for 135 h."
     assert [chip.label for chip in figure.chips] == ["no physics", "template", NASTY]
     assert "<b>" not in f"{sister.name} {sister.customdata}"
 
