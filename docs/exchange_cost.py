@@ -11,15 +11,19 @@ import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.exchange.cells import read_cell_table
 from shipid.exchange.cost import Ways
+from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law
 from shipid.study.schema import Cost
 
 Array = NDArray[np.float64]
-SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 1000, 24, 2000
+SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 1000, 16, 2000
 SHARES = np.geomspace(0.003, 10, 20)  # what a rule of thumb may be tuned to
 PILOT = 10  # runs of the fourth rule
 HEAD = """| goal | who decides | regret: mean [%] | median [%] | of the best rule's |
@@ -28,7 +32,11 @@ HEAD = """| goal | who decides | regret: mean [%] | median [%] | of the best rul
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """A ship with prices and a goal: errors (F, K) [m] that are true, what each costs, and the error `scale` [m]."""
+    """A ship with prices and a goal.
+
+    truth : errors (F, K) [m] that are true, as of `as_used`. prices (F,), amounts (K,) : as of `Ways`.
+    scale : error of constant u, v, r [m].
+    """
 
     ship: str
     truth: Array
@@ -36,6 +44,14 @@ class Instance:
     prices: Array
     amounts: Array
     scale: float
+
+
+def as_used(error: Array, scale: float) -> Array:
+    """Errors (..., F, K) of whoever takes constant u, v, r where runs show that they err less, and without physics."""
+    used = error.copy()
+    used[..., 1:] = np.minimum(error[..., 1:], scale)
+    used[..., 0, 0] = scale
+    return used
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +81,7 @@ def total_cost(instance: Instance, policy: Policy) -> float:
     runs = np.where(instance.amounts > 0, cost.mobilisation + cost.run * instance.amounts, 0.0)
     while True:
         now = truth[state.mask, state.place]
-        if cost.H_end_required is not None and state.place and np.nanmin(now) <= cost.H_end_required:
+        if cost.H_end_required is not None and state.place and now.min() <= cost.H_end_required:
             return spent
         place, bought = policy(instance, state)
         if cost.H_end_required is not None and (place, bought) == STOP:
@@ -80,10 +96,8 @@ def total_cost(instance: Instance, policy: Policy) -> float:
             spent += float(runs[place] - runs[state.place])
             state = replace(state, place=place)
         else:
-            taken = now if state.place else truth[np.flatnonzero(state.mask)[-1:], 0]
-            return spent + float(cost.per_metre or 0) * float(
-                np.nanmin(np.where(np.isnan(taken), 2 * instance.scale, taken))
-            )
+            error = now.min() if state.place else truth[np.flatnonzero(state.mask)[-1], 0]
+            return spent + float(cost.per_metre or 0) * float(error)
 
 
 def least_cost(instance: Instance) -> float:
@@ -91,7 +105,7 @@ def least_cost(instance: Instance) -> float:
     runs = np.where(instance.amounts > 0, instance.cost.mobilisation + instance.cost.run * instance.amounts, 0.0)
     price = instance.prices[:, None] + runs
     if instance.cost.per_metre is not None:
-        return float(np.nanmin(price + instance.cost.per_metre * instance.truth))
+        return float((price + instance.cost.per_metre * instance.truth).min())
     return float(price[(instance.truth <= instance.cost.H_end_required) & (instance.amounts > 0)].min())
 
 
@@ -153,6 +167,9 @@ def pilot(share: float) -> Policy:
 
     def step(instance: Instance, state: Bought) -> Step:
         best, first = dearest(instance, share * stake(instance)), place_of(instance, PILOT)
+        pilot_price = instance.cost.mobilisation + instance.cost.run * PILOT
+        if not state.place and instance.cost.per_metre is not None and pilot_price > stake(instance):
+            return STOP
         if not state.mask[best]:
             return -1, best
         if state.place < first:
@@ -222,7 +239,6 @@ def draw_curves(count: int, rng: np.random.Generator) -> Array:
     power = np.exp(rng.normal(np.log(0.6), 0.25, (count, 1, 1)))
     A = np.exp(np.log(TYPICAL)[None, :, None] + rng.normal(0, 0.4, (count, 5, 1)))
     curves = np.sqrt(floor**2 + (A * (1 + GRID / first) ** -power) ** 2)
-    curves[:, 0, 0] = np.nan
     return curves
 
 
@@ -230,7 +246,7 @@ def ships_of_known_law(count: int, seed: int) -> dict[str, Array]:
     """Ship -> its errors (F, K), as cells would have them."""
     rng = np.random.default_rng(seed)
     curves = draw_curves(count, rng)
-    return {f"ship {i}": one for i, one in enumerate(curves * np.exp(rng.normal(0, REST, curves.shape)))}
+    return {f"ship {i}": one for i, one in enumerate(as_used(curves * np.exp(rng.normal(0, REST, curves.shape)), 1.0))}
 
 
 def knowledge_of_known_law(seed: int) -> Knowledge:
@@ -241,8 +257,8 @@ def knowledge_of_known_law(seed: int) -> Knowledge:
     @lru_cache(4000)
     def draws(_ship: str, seen: bytes, _place: int, _mask: tuple[bool, ...]) -> Array:
         known = np.frombuffer(seen).reshape(curves.shape[1:])
-        far = np.where(np.isfinite(known), (np.log(known) - np.log(curves)) / REST, 0.0)
-        misfit = 0.5 * np.square(np.nan_to_num(far)).sum(axis=(1, 2))
+        far = np.where(np.isfinite(known), (np.log(known) - np.log(as_used(curves, 1.0))) / REST, 0.0)
+        misfit = 0.5 * np.square(far).sum(axis=(1, 2))
         for temper in 0.7 ** np.arange(30):
             weights = np.exp(-temper * (misfit - misfit.min()))
             weights /= weights.sum()
@@ -250,21 +266,25 @@ def knowledge_of_known_law(seed: int) -> Knowledge:
                 break
         taken = curves[rng.choice(len(curves), DRAWS, p=weights)]
         taken = taken * np.exp(rng.normal(0, REST, taken.shape))
-        return np.where(np.isfinite(known), known, taken)
+        return np.where(np.isfinite(known), known, as_used(taken, 1.0))
 
     return draws
 
 
 def draw_instances(ships: Mapping[str, Array], amounts: Array, seed: int, goal: str) -> list[Instance]:
-    """Prices and goals for each ship: in runs, over wide ranges; better physics costs more."""
+    """Prices and goals for each ship: in runs, over wide ranges; better physics costs more.
+
+    ships : name -> errors (F, K), of which those of no physics without runs are of constant u, v, r.
+    """
     rng, result = np.random.default_rng(seed), []
     for ship, truth in ships.items():
+        scale = float(truth[0, 0])
         for _ in range(INSTANCES):
             prices = np.append(0.0, np.sort(np.exp(rng.uniform(np.log(0.1), np.log(100), len(truth) - 1))))
-            first, scale = float(np.exp(rng.uniform(np.log(0.1), np.log(30)))), 1.0
-            best = np.nanmin(truth[:, 1:])
+            first = float(np.exp(rng.uniform(np.log(0.1), np.log(30))))
+            best = truth[:, 1:].min()
             aim = {"per_metre": float(np.exp(rng.uniform(0, np.log(1000)))) / scale}
-            required = {"H_end_required": float(np.exp(rng.uniform(np.log(1.02 * best), np.log(max(scale, 2 * best)))))}
+            required = {"H_end_required": float(np.exp(rng.uniform(np.log(1.02 * best), np.log(scale))))}
             cost = Cost(unit="run", run=1.0, mobilisation=first, **(aim if goal == "per_metre" else required))
             result.append(Instance(ship, truth, cost, prices, amounts, scale))
     return result
@@ -275,15 +295,18 @@ def regrets(instances: Sequence[Instance], policy: Policy) -> Array:
     return np.array([total_cost(one, policy) / max(least_cost(one), 1e-9) - 1 for one in instances])
 
 
-def judge(instances: Sequence[Instance], others: Sequence[Instance], advice: Policy) -> Iterator[str]:
-    """Rows of the table for one goal."""
+def judge(instances: Sequence[Instance], advice: Policy) -> Iterator[str]:
+    """Rows of the table for one goal; the number of each rule is tuned on the ships of the other folds."""
+    names = np.array(list(dict.fromkeys(one.ship for one in instances)))
     ship = np.array([one.ship for one in instances])
+    fold = {name: place % FOLDS for place, name in enumerate(np.random.default_rng(SEED).permutation(sorted(names)))}
+    place = np.array([fold[one] for one in ship])
     found = {"the advice": regrets(instances, advice)}
     for name, rule in RULES.items():
-        share = min(SHARES, key=lambda share: float(regrets(others, rule(share)).mean()))
-        found[f"{name} ({share:.2g})"] = regrets(instances, rule(share))
+        tried = np.array([regrets(instances, rule(share)) for share in SHARES])
+        chosen = [int(tried[:, place != one].mean(axis=1).argmin()) for one in range(FOLDS)]
+        found[name] = tried[np.array(chosen)[place], np.arange(len(place))]
     best = min((name for name in found if name != "the advice"), key=lambda name: float(found[name].mean()))
-    names = np.unique(ship)
     by_ship = {name: np.array([values[ship == one].mean() for one in names]) for name, values in found.items()}
     drawn = np.random.default_rng(SEED).integers(len(names), size=(RESAMPLES, len(names)))
     goal = "required" if instances[0].cost.per_metre is None else "per metre"
@@ -299,14 +322,72 @@ def judge(instances: Sequence[Instance], others: Sequence[Instance], advice: Pol
         )
 
 
+# Ships of a table of cells.
+
+AHEAD, FOLDS = 2.0, 5
+OPTIONS = ("none", "template", "sister", "moderate", "nominal")
+"""Kinds of physics that are for sale, the dearer the later; of several members the first. Nominal: nothing is wrong."""
+
+
+def ways_of_cells(cells: pd.DataFrame) -> tuple[dict[str, pd.DataFrame], Array]:
+    """Ship -> its cells at 2 ship lengths of what is for sale, and the amounts that all ships have."""
+    cells = cells[cells["kind"].isin(OPTIONS) & np.isclose(cells["ahead"], AHEAD)]
+    first = cells.groupby(["ship", "kind"])["foundation"].transform("min")
+    cells = cells[cells["foundation"] == first]
+    counts = cells[cells["kind"] == "none"].groupby("N_D")["ship"].nunique()
+    amounts = np.array([0.0, *counts.index[(counts == counts.max()) & (counts.index > 0)]])
+    return {str(name): ship for name, ship in cells.groupby("ship")}, amounts
+
+
+def errors_of_ship(ship: pd.DataFrame, amounts: Array) -> Array:
+    """(F, K) errors of a ship in the order of `OPTIONS`, without physics that has no error at an amount."""
+    wide = ship.pivot_table(index="kind", columns="N_D", values="H").reindex(OPTIONS, columns=amounts)
+    wide.loc["none", 0] = ship["baseline"].iloc[0]
+    return as_used(wide.dropna().to_numpy(), float(ship["baseline"].iloc[0]))
+
+
+def knowledge_of_law(cells: pd.DataFrame, ships: Mapping[str, pd.DataFrame], amounts: Array) -> Knowledge:
+    """Draws of the law fitted to the ships of the other folds, given what is seen of the ship itself."""
+    names = np.random.default_rng(SEED).permutation(sorted(ships))
+    whole = fit_law(cells)
+    laws: dict[str, ExchangeLaw] = {}
+    for fold in range(FOLDS):
+        out = names[fold::FOLDS]
+        laws |= dict.fromkeys(out, fit_law(cells[~cells["ship"].isin(out)], whole))
+
+    @lru_cache(None)
+    def draws(ship: str, _seen: bytes, place: int, mask: tuple[bool, ...]) -> Array:
+        mine = ships[ship]
+        one, kinds = mine.iloc[0], [kind for kind in OPTIONS if kind in set(mine["kind"])]
+        paid = [kind for kind, bought in zip(kinds, mask, strict=True) if bought]
+        known = mine[mine["kind"].isin(paid) & (mine["N_D"] <= amounts[place])]
+        law = laws[ship].given(known) if place else laws[ship]
+        called = mine.drop_duplicates("kind").set_index("kind")["foundation"]
+        asked = [called[kind] if place and kind in paid else kind for kind in kinds]
+        met = UnseenShip(one["length"], one["speed"], one["baseline"])
+        drawn = as_used(law.expect_all(met, asked, amounts.astype(int).tolist(), AHEAD, DRAWS), one["baseline"])
+        seen = np.frombuffer(_seen).reshape(drawn.shape[1:])
+        return np.where(np.isfinite(seen), seen, drawn)
+
+    return draws
+
+
 def main() -> None:
-    """Judge the advice on ships of a known law."""
-    argparse.ArgumentParser(description=__doc__).parse_args()
+    """Judge the advice on ships of a known law, or on those of a table of cells."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cells", type=Path, nargs="?", help="table of cells; default: ships of a known law")
+    file = parser.parse_args().cells
+    if file is None:
+        mine, amounts, advice = ships_of_known_law(30, SEED + 3), GRID, advise_by(knowledge_of_known_law(SEED + 5))
+    else:
+        cells = read_cell_table(file)
+        ships, amounts = ways_of_cells(cells)
+        mine = {name: errors_of_ship(ship, amounts) for name, ship in ships.items()}
+        advice = advise_by(knowledge_of_law(cells, ships, amounts))
+        print(f"{len(mine)} ships, {', '.join(OPTIONS)}, N_D {', '.join(f'{one:g}' for one in amounts)}:\n")
     print(HEAD)
     for goal in ("per_metre", "H_end_required"):
-        others = draw_instances(ships_of_known_law(40, SEED + 1), GRID, SEED + 2, goal)
-        mine = draw_instances(ships_of_known_law(30, SEED + 3), GRID, SEED + 4, goal)
-        for row in judge(mine, others, advise_by(knowledge_of_known_law(SEED + 5))):
+        for row in judge(draw_instances(mine, amounts, SEED + 4, goal), advice):
             print(row, flush=True)
 
 

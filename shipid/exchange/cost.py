@@ -21,7 +21,7 @@ from shipid.exchange.expect import study_cells
 from shipid.exchange.law import read_law
 from shipid.metrics import error_at_horizon
 from shipid.report.content import model_text
-from shipid.report.wording import counted_text, difference_text, metres_text
+from shipid.report.wording import CONSTANT_MOTION, counted_text, difference_text, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.results import Results
 from shipid.study.schema import Cost
@@ -209,6 +209,7 @@ class Ways:
         """A way, its price, its error, and its chance or its loss, in words."""
         low, middle, high = np.quantile(self.error[:, f, k], [0.025, 0.5, 0.975])
         text = f"{model_text(self.foundations[f])} with {counted_text(int(self.amounts[k]), 'run')} for "
+        text = f"{CONSTANT_MOTION} for " if self.foundations[f] == NO_MODEL and self.amounts[k] == 0 else text
         text += f"{self.money(self.price[f, k])}: {difference_text(middle, low, high)}"
         if self.cost.per_metre is None:
             return f"{text}, a chance of {percent_text(self.reach[f, k])}"
