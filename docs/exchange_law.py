@@ -65,7 +65,7 @@ def score(error: np.ndarray, inside: np.ndarray) -> list[str]:
 
 def linear_form() -> object:
     """The rival: the same effects, no floor beside them."""
-    return FORM._replace(floored=False)
+    return FORM._replace(floor=())
 
 
 def gaussian_process(train: pd.DataFrame, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
@@ -179,7 +179,12 @@ def main() -> None:
     part = law.parts["H"]
     print(f"{provenance['cells']} cells of {provenance['ships']} ships, digest {digest}\n")
     print("| feature | theta | error |\n| --- | ---: | ---: |")
-    for name, value, error in zip([*FORM.features, "c"], part.theta, np.sqrt(np.diag(part.covariance)), strict=True):
+    for name, value, error in zip(
+        [*FORM.features, *(f"floor: {one}" for one in FORM.floor)],
+        part.theta,
+        np.sqrt(np.diag(part.covariance)),
+        strict=True,
+    ):
         print(f"| {name} | {value:.3f} | {error:.3f} |")
     print("\n| level | feature | standard deviation |\n| --- | --- | ---: |")
     for (level, feature), variance in zip(FORM.levels, part.variances, strict=True):

@@ -34,15 +34,15 @@ LAW_DIGITS = 8  # of numbers in the file: rounding moves a prediction by less th
 class Response(NamedTuple):
     """What a hierarchy predicts: ln(value / unit), with its features and the levels of its effects.
 
-    levels : (columns that make a group, feature of its effect); the last one is that of a row. floored : whether the
-    floor adds in squares.
+    levels : (columns that make a group, feature of its effect); the last one is that of a row. floor : features of
+    the logarithm of what adds in squares, if anything does.
     """
 
     value: str
     unit: str
     features: tuple[str, ...]
     levels: tuple[tuple[str, str], ...]
-    floored: bool = False
+    floor: tuple[str, ...] = ()
 
 
 SHIP, KIND, FOUNDATION, RUNS, CELL, ROW = (
@@ -58,14 +58,14 @@ RESPONSES = {
     "H": Response(
         "H",
         "baseline",
-        ("1", "n", "a", "a:n", "p", "p:n", "h", "h:n", "none", "none:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
+        ("1", "n", "a", "a:n", "h", "h:n", "none", "none:n", *FLAWS, *(f"{kind}:n" for kind in FLAWS)),
         (
             *((SHIP, feature) for feature in ("1", "n", "a", "h")),
             *((level, feature) for level in (KIND, FOUNDATION) for feature in ("1", "n")),
             *((level, feature) for level in (RUNS, CELL) for feature in ("1", "few")),
             (ROW, "1"),
         ),
-        True,
+        ("1", "p", "n", "h"),
     ),
     "A": Response(
         "A",
@@ -90,6 +90,9 @@ SEAS = ("calm", "ordinary", "rough")
 ASKED = "asked"  # name of the ship that the law is asked about
 ANY = "any"  # kind of a physics of which A is all that is known: each draw has another one
 LIMITED = ("length", "froude", "N_D", "ahead", "A")
+CENTRE, FLOOR_CENTRE = {"1": -2.0, "a": 1.0, "n": -0.4}, {"1": -0.5, "p": 1.0}
+"""Means of the priors of H that are not 0: a share of A, falling with runs, beside a share of the floor."""
+MOST_STEP = 0.5  # of theta in one round
 WIDE, NARROW = 3.0, 0.3  # standard deviations of the Gaussian priors of features, and of those of a kind
 
 
@@ -131,8 +134,7 @@ class Hierarchy:
 
     def mean(self, cells: pd.DataFrame) -> tuple[Array, Array]:
         """ln(value / unit) (rows,) without effects, and its derivatives (rows, P) by theta."""
-        features = feature_columns(cells, self.response.features)
-        return mean_of_features(self.response, self.theta, features, feature_columns(cells, ["p"])[:, 0])
+        return mean_of_features(self.theta, *_both_features(self.response, cells))
 
     def spread(self, cells: pd.DataFrame, jacobian: Array) -> Array:
         """Covariance (rows, rows) of cells of one ship: effects, rest, and what is unknown of theta."""
@@ -169,14 +171,19 @@ class Hierarchy:
         return float(max(self.ships - sum(level == SHIP for level, _ in self.response.levels), 3))
 
 
-def mean_of_features(response: Response, theta: Array, features: Array, floor: Array) -> tuple[Array, Array]:
-    """ln(value / unit) (rows,) of features (rows, F) and p (rows,), and its derivatives (rows, P) by theta."""
-    linear = features @ theta[: features.shape[1]]
-    if not response.floored:
+def _both_features(response: Response, cells: pd.DataFrame) -> tuple[Array, Array]:
+    """Features (rows, F) of what data reduce, and (rows, G) of the floor."""
+    return tuple(np.split(feature_columns(cells, response.features + response.floor), [len(response.features)], axis=1))  # type: ignore[return-value]
+
+
+def mean_of_features(theta: Array, features: Array, floor: Array) -> tuple[Array, Array]:
+    """ln(value / unit) (rows,) of features, and its derivatives (rows, P) by theta (P,)."""
+    linear, low = features @ theta[: features.shape[1]], floor @ theta[features.shape[1] :]
+    if not floor.shape[1]:
         return linear, features
-    total = np.logaddexp(2 * linear, 2 * (theta[-1] + floor)) / 2
+    total = np.logaddexp(2 * linear, 2 * low) / 2
     share = np.exp(2 * (linear - total))[:, None]
-    return total, np.hstack([share * features, 1 - share])
+    return total, np.hstack([share * features, (1 - share) * floor])
 
 
 def _kernels(response: Response, cells: pd.DataFrame) -> list[Array]:
@@ -205,7 +212,7 @@ def response_rows(response: Response, cells: pd.DataFrame) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class _Design:
-    """Rows of one ship, sorted by cell: values (rows,), features, floor p (rows, 1), and what makes their covariance.
+    """Rows of one ship, sorted by cell: values (rows,), both features, and what makes their covariance.
 
     effects (rows, G) with their levels (G,), all but those of a cell and a row. starts, counts (cells,): rows of each
     cell; weights (cells, inner levels): squared features of the levels of a cell.
@@ -234,8 +241,7 @@ class _Design:
         inner = [place for place, (level, _) in enumerate(response.levels) if level == CELL]
         return cls(
             response_values(response, rows),
-            feature_columns(rows, response.features),
-            feature_columns(rows, ["p"])[:, 0],
+            *_both_features(response, rows),
             np.hstack(effects),
             np.array(levels),
             starts,
@@ -280,8 +286,10 @@ def fit_hierarchy(
 
 def prior_of(response: Response) -> tuple[Array, Array]:
     """Means and standard deviations (P,) of the Gaussian priors of theta."""
-    widths = [NARROW if name.split(":")[0] in FLAWS and response.floored else WIDE for name in response.features]
-    return np.array([*[0.0] * len(widths), *[-1.0] * response.floored]), np.array([*widths, *[1.0] * response.floored])
+    widths = [NARROW if name.split(":")[0] in FLAWS and response.floor else WIDE for name in response.features]
+    centre = [CENTRE.get(name, 0.0) * bool(response.floor) for name in response.features]
+    centre += [FLOOR_CENTRE.get(name, 0.0) for name in response.floor]
+    return np.array(centre), np.array(widths + [1.0] * len(response.floor))
 
 
 def _improve(
@@ -293,7 +301,7 @@ def _improve(
     for ship in ships:
         within = ship.weights @ variances[inner]
         shrink = 1 - np.sqrt(rest / (rest + ship.counts * within))
-        mean, jacobian = mean_of_features(response, theta, ship.features, ship.floor)
+        mean, jacobian = mean_of_features(theta, ship.features, ship.floor)
         joined = ship.whiten(np.column_stack([ship.effects, jacobian, ship.values - mean]), shrink, rest)
         effects, plain = np.split(joined, [ship.effects.shape[1]], axis=1)
         scaled = effects * np.sqrt(variances[ship.levels])
@@ -304,7 +312,7 @@ def _improve(
         right += slopes[:, :-1].T @ plain[:, -1]
         solved.append((ship, effects, taken, slopes, within, shrink))
     covariance = np.linalg.inv(normal)
-    step, spread = covariance @ right, np.linalg.cholesky(covariance)
+    step, spread = np.clip(covariance @ right, -MOST_STEP, MOST_STEP), np.linalg.cholesky(covariance)
     quadratic, trace = np.zeros((2, len(variances)))
     for ship, effects, taken, slopes, within, shrink in solved:
         residual = slopes[:, -1:] - slopes[:, :-1] @ step[:, None]

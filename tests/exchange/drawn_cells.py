@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 
 from shipid.exchange.cells import CELL_COLUMNS
-from shipid.exchange.law import RESPONSES, Hierarchy
+from shipid.exchange.law import FLOOR_CENTRE, RESPONSES, Hierarchy
 from shipid.units import GRAVITY
 
 KINDS = ("nominal", *["damping", "mass", "thrust", "missing", "moderate", "high"] * 2, "template", "sister", "none")
 AMOUNTS, HORIZONS = (1, 2, 4, 8, 16, 32, 64), (1.0, 2.0, 4.0)
 TRUE_THETA = {
-    "1": -1.0, "n": -0.4, "a": 0.5, "a:n": -0.1, "h": 0.1, "none": -0.1, "none:n": -0.1, "damping": 0.2, "mass": -0.2,
+    "1": -1.5, "n": -0.4, "a": 0.8, "a:n": -0.1, "h": 0.1, "none": -0.1, "none:n": -0.1, "damping": 0.2, "mass": -0.2,
 }  # fmt: skip
 TRUE_SPREAD = {
     ("ship", "1"): 0.2, ("ship", "n"): 0.08, ("ship foundation", "1"): 0.1, ("ship N_D", "1"): 0.1,
@@ -23,7 +23,10 @@ TRUE_SPREAD = {
 def true_law() -> Hierarchy:
     """The law of H that the cells are drawn from: nothing of it is unknown."""
     form = RESPONSES["H"]
-    theta = np.array([*(TRUE_THETA.get(name, 0.0) for name in form.features), -0.5])
+    floor = {**FLOOR_CENTRE, "n": -0.1}
+    theta = np.array(
+        [*(TRUE_THETA.get(name, 0.0) for name in form.features), *(floor.get(name, 0.0) for name in form.floor)]
+    )
     variances = np.array([TRUE_SPREAD.get(level, 0.0) ** 2 for level in form.levels])
     return Hierarchy(form, theta, np.zeros((len(theta),) * 2), variances, 1000)
 
