@@ -18,12 +18,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.exchange.cells import read_cell_table
-from shipid.exchange.cost import Ways
+from shipid.exchange.cost import Ways, errors_in_use
 from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law
 from shipid.study.schema import Cost
 
 Array = NDArray[np.float64]
-SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 1000, 16, 2000
+SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 800, 10, 2000
 SHARES = np.geomspace(0.003, 10, 20)  # what a rule of thumb may be tuned to
 PILOT = 10  # runs of the fourth rule
 HEAD = """| goal | who decides | regret: mean [%] | median [%] | of the best rule's |
@@ -34,7 +34,7 @@ HEAD = """| goal | who decides | regret: mean [%] | median [%] | of the best rul
 class Instance:
     """A ship with prices and a goal.
 
-    truth : errors (F, K) [m] that are true, as of `as_used`. prices (F,), amounts (K,) : as of `Ways`.
+    truth : errors (F, K) [m] that are true, as of `errors_in_use`. prices (F,), amounts (K,) : as of `Ways`.
     scale : error of constant u, v, r [m].
     """
 
@@ -44,14 +44,6 @@ class Instance:
     prices: Array
     amounts: Array
     scale: float
-
-
-def as_used(error: Array, scale: float) -> Array:
-    """Errors (..., F, K) of whoever takes constant u, v, r where runs show that they err less, and without physics."""
-    used = error.copy()
-    used[..., 1:] = np.minimum(error[..., 1:], scale)
-    used[..., 0, 0] = scale
-    return used
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,25 +231,34 @@ def draw_curves(count: int, rng: np.random.Generator) -> Array:
     power = np.exp(rng.normal(np.log(0.6), 0.25, (count, 1, 1)))
     A = np.exp(np.log(TYPICAL)[None, :, None] + rng.normal(0, 0.4, (count, 5, 1)))
     curves = np.sqrt(floor**2 + (A * (1 + GRID / first) ** -power) ** 2)
+    curves[:, 0, 0] = 1.0
     return curves
+
+
+def add_rest(curves: Array, rng: np.random.Generator) -> Array:
+    """Errors in use, with what no law explains; that of constant u, v, r is known."""
+    rest = np.exp(rng.normal(0, REST, curves.shape))
+    rest[:, 0, 0] = 1.0
+    return errors_in_use(curves * rest)
 
 
 def ships_of_known_law(count: int, seed: int) -> dict[str, Array]:
     """Ship -> its errors (F, K), as cells would have them."""
     rng = np.random.default_rng(seed)
     curves = draw_curves(count, rng)
-    return {f"ship {i}": one for i, one in enumerate(as_used(curves * np.exp(rng.normal(0, REST, curves.shape)), 1.0))}
+    return {f"ship {i}": one for i, one in enumerate(add_rest(curves, rng))}
 
 
 def knowledge_of_known_law(seed: int) -> Knowledge:
     """Draws of the known law given what is seen: importance weights, tempered where few draws would be left."""
     rng = np.random.default_rng(seed)
     curves = draw_curves(30_000, rng)
+    used = np.log(errors_in_use(curves))
 
     @lru_cache(4000)
     def draws(_ship: str, seen: bytes, _place: int, _mask: tuple[bool, ...]) -> Array:
         known = np.frombuffer(seen).reshape(curves.shape[1:])
-        far = np.where(np.isfinite(known), (np.log(known) - np.log(as_used(curves, 1.0))) / REST, 0.0)
+        far = np.where(np.isfinite(known), (np.log(known) - used) / REST, 0.0)
         misfit = 0.5 * np.square(far).sum(axis=(1, 2))
         for temper in 0.7 ** np.arange(30):
             weights = np.exp(-temper * (misfit - misfit.min()))
@@ -265,19 +266,18 @@ def knowledge_of_known_law(seed: int) -> Knowledge:
             if 1 / np.square(weights).sum() >= 150:
                 break
         taken = curves[rng.choice(len(curves), DRAWS, p=weights)]
-        taken = taken * np.exp(rng.normal(0, REST, taken.shape))
-        return np.where(np.isfinite(known), known, as_used(taken, 1.0))
+        return np.where(np.isfinite(known), known, add_rest(taken, rng))
 
     return draws
 
 
-def draw_instances(ships: Mapping[str, Array], amounts: Array, seed: int, goal: str) -> list[Instance]:
+def draw_instances(ships: Mapping[str, tuple[Array, Array]], seed: int, goal: str) -> list[Instance]:
     """Prices and goals for each ship: in runs, over wide ranges; better physics costs more.
 
-    ships : name -> errors (F, K), of which those of no physics without runs are of constant u, v, r.
+    ships : name -> errors (F, K) and amounts (K,); those of no physics without runs are of constant u, v, r.
     """
     rng, result = np.random.default_rng(seed), []
-    for ship, truth in ships.items():
+    for ship, (truth, amounts) in ships.items():
         scale = float(truth[0, 0])
         for _ in range(INSTANCES):
             prices = np.append(0.0, np.sort(np.exp(rng.uniform(np.log(0.1), np.log(100), len(truth) - 1))))
@@ -329,24 +329,33 @@ OPTIONS = ("none", "template", "sister", "moderate", "nominal")
 """Kinds of physics that are for sale, the dearer the later; of several members the first. Nominal: nothing is wrong."""
 
 
-def ways_of_cells(cells: pd.DataFrame) -> tuple[dict[str, pd.DataFrame], Array]:
-    """Ship -> its cells at 2 ship lengths of what is for sale, and the amounts that all ships have."""
+def ways_of_cells(cells: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Ship -> its cells at 2 ship lengths of what is for sale."""
     cells = cells[cells["kind"].isin(OPTIONS) & np.isclose(cells["ahead"], AHEAD)]
     first = cells.groupby(["ship", "kind"])["foundation"].transform("min")
-    cells = cells[cells["foundation"] == first]
-    counts = cells[cells["kind"] == "none"].groupby("N_D")["ship"].nunique()
-    amounts = np.array([0.0, *counts.index[(counts == counts.max()) & (counts.index > 0)]])
-    return {str(name): ship for name, ship in cells.groupby("ship")}, amounts
+    return {str(name): ship for name, ship in cells[cells["foundation"] == first].groupby("ship")}
 
 
-def errors_of_ship(ship: pd.DataFrame, amounts: Array) -> Array:
-    """(F, K) errors of a ship in the order of `OPTIONS`, without physics that has no error at an amount."""
-    wide = ship.pivot_table(index="kind", columns="N_D", values="H").reindex(OPTIONS, columns=amounts)
+def amounts_of(ship: pd.DataFrame) -> Array:
+    """Amounts (K,) of the cells of a ship, 0 first."""
+    return np.array(sorted({0.0, *ship["N_D"][ship["kind"] == "none"]}))
+
+
+def kinds_of_ship(ship: pd.DataFrame) -> list[str]:
+    """Kinds of physics of a ship that have an error at each of its amounts, in the order of `OPTIONS`."""
+    known = ship[ship["N_D"].isin(amounts_of(ship))].groupby("kind")["N_D"].nunique()
+    whole = len(amounts_of(ship)) - (known.index == "none")
+    return [kind for kind in OPTIONS if kind in known.index[known == whole]]
+
+
+def errors_of_ship(ship: pd.DataFrame) -> Array:
+    """(F, K) errors of a ship by `kinds_of_ship` and `amounts_of`."""
+    wide = ship.pivot_table(index="kind", columns="N_D", values="H").reindex(columns=amounts_of(ship))
     wide.loc["none", 0] = ship["baseline"].iloc[0]
-    return as_used(wide.dropna().to_numpy(), float(ship["baseline"].iloc[0]))
+    return errors_in_use(wide.loc[kinds_of_ship(ship)].to_numpy())
 
 
-def knowledge_of_law(cells: pd.DataFrame, ships: Mapping[str, pd.DataFrame], amounts: Array) -> Knowledge:
+def knowledge_of_law(cells: pd.DataFrame, ships: Mapping[str, pd.DataFrame]) -> Knowledge:
     """Draws of the law fitted to the ships of the other folds, given what is seen of the ship itself."""
     names = np.random.default_rng(SEED).permutation(sorted(ships))
     whole = fit_law(cells)
@@ -357,15 +366,15 @@ def knowledge_of_law(cells: pd.DataFrame, ships: Mapping[str, pd.DataFrame], amo
 
     @lru_cache(None)
     def draws(ship: str, _seen: bytes, place: int, mask: tuple[bool, ...]) -> Array:
-        mine = ships[ship]
-        one, kinds = mine.iloc[0], [kind for kind in OPTIONS if kind in set(mine["kind"])]
+        mine, amounts = ships[ship], amounts_of(ships[ship])
+        one, kinds = mine.iloc[0], kinds_of_ship(mine)
         paid = [kind for kind, bought in zip(kinds, mask, strict=True) if bought]
         known = mine[mine["kind"].isin(paid) & (mine["N_D"] <= amounts[place])]
         law = laws[ship].given(known) if place else laws[ship]
         called = mine.drop_duplicates("kind").set_index("kind")["foundation"]
         asked = [called[kind] if place and kind in paid else kind for kind in kinds]
         met = UnseenShip(one["length"], one["speed"], one["baseline"])
-        drawn = as_used(law.expect_all(met, asked, amounts.astype(int).tolist(), AHEAD, DRAWS), one["baseline"])
+        drawn = errors_in_use(law.expect_all(met, asked, amounts.astype(int).tolist(), AHEAD, DRAWS))
         seen = np.frombuffer(_seen).reshape(drawn.shape[1:])
         return np.where(np.isfinite(seen), seen, drawn)
 
@@ -378,16 +387,17 @@ def main() -> None:
     parser.add_argument("cells", type=Path, nargs="?", help="table of cells; default: ships of a known law")
     file = parser.parse_args().cells
     if file is None:
-        mine, amounts, advice = ships_of_known_law(30, SEED + 3), GRID, advise_by(knowledge_of_known_law(SEED + 5))
+        mine = {name: (truth, GRID) for name, truth in ships_of_known_law(30, SEED + 3).items()}
+        advice = advise_by(knowledge_of_known_law(SEED + 5))
     else:
         cells = read_cell_table(file)
-        ships, amounts = ways_of_cells(cells)
-        mine = {name: errors_of_ship(ship, amounts) for name, ship in ships.items()}
-        advice = advise_by(knowledge_of_law(cells, ships, amounts))
-        print(f"{len(mine)} ships, {', '.join(OPTIONS)}, N_D {', '.join(f'{one:g}' for one in amounts)}:\n")
+        ships = ways_of_cells(cells)
+        mine = {name: (errors_of_ship(ship), amounts_of(ship)) for name, ship in ships.items()}
+        advice = advise_by(knowledge_of_law(cells, ships))
+    print(f"{len(mine)} ships, {INSTANCES} draws of prices and goals for each; physics: {', '.join(OPTIONS)}\n")
     print(HEAD)
     for goal in ("per_metre", "H_end_required"):
-        for row in judge(draw_instances(mine, amounts, SEED + 4, goal), advice):
+        for row in judge(draw_instances(mine, SEED + 4, goal), advice):
             print(row, flush=True)
 
 

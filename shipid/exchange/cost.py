@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from shipid.errors import ShipidError
 from shipid.exchange.expect import study_cells
 from shipid.exchange.law import read_law
-from shipid.metrics import error_at_horizon
 from shipid.report.content import model_text
 from shipid.report.wording import CONSTANT_MOTION, counted_text, difference_text, metres_text
 from shipid.study.declared import NO_MODEL
@@ -28,7 +27,7 @@ from shipid.study.schema import Cost
 from shipid.units import percent_text
 
 Array = NDArray[np.float64]
-DRAWS = 2000
+DRAWS = 1000
 PROBABLE = 0.8  # chance from which on a way is said to reach a goal
 AMOUNTS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 100)
 """Numbers of runs that are tried."""
@@ -216,13 +215,22 @@ class Ways:
         return f"{text}, {self.money(self.expected[f, k])} with what the error costs"
 
 
+def errors_in_use(error: Array) -> Array:
+    """Errors (..., F, K) of whoever sees on runs that the physics alone, or constant u, v, r, err less, and takes them.
+
+    The first amount is 0, where the errors are those of the physics alone, and for the first foundation, no physics,
+    those of constant u, v, r.
+    """
+    least = np.minimum(error[..., :1], error[..., :1, :1])
+    return np.concatenate([error[..., :1], np.minimum(error[..., 1:], least)], axis=-1)
+
+
 @lru_cache(1)
 def study_ways(results: Results) -> Ways:
     """Ways to the goal of a study that has `[cost]`, by the law given the cells of the study.
 
     Recorded runs that may train are there already. A name of `[cost.foundations]` is a family, of which each draw is
-    one member, or a kind of physics that has not been tried. Whoever has runs sees what errs more than constant u, v, r
-    do, and takes these. Raises ShipidError where no vessel has a length, or no
+    one member, or a kind of physics that has not been tried. Raises ShipidError where no vessel has a length, or no
     cell a result.
     """
     cost = results.plan.study.cost
@@ -235,14 +243,12 @@ def study_ways(results: Results) -> Ways:
     amounts = [have, *(amount for amount in AMOUNTS if amount > have)]
     names = [NO_MODEL, *cost.foundations]
     members = [list(own["foundation"][own["family"] == name].unique()) or [name] for name in names]
-    law, ahead = read_law().given(own), float(own["ahead"].iloc[0])
-    drawn = law.expect_all(ship, [one for several in members for one in several], amounts, ahead, DRAWS)
+    law, asked = read_law().given(own), [one for several in members for one in several]
+    drawn = law.expect_all(ship, asked, sorted({0, *amounts}), float(own["ahead"].iloc[0]), DRAWS)
     first = np.cumsum([0, *map(len, members[:-1])])
     taken = first + np.random.default_rng(0).integers([len(several) for several in members], size=(DRAWS, len(names)))
-    error = drawn[np.arange(DRAWS)[:, None], taken] * float((ends["H_end"] / ends["H"]).median())
-    naive, runs = float(error_at_horizon(results.naive).mean()), np.array(amounts) > 0
-    error[:, :, runs] = np.minimum(error[:, :, runs], naive)
-    error[:, 0, ~runs] = naive
+    error = errors_in_use(drawn[np.arange(DRAWS)[:, None], taken])[:, :, -len(amounts) :]
+    error = error * float((ends["H_end"] / ends["H"]).median())
     prices = np.array([0.0, *cost.foundations.values()])
     return Ways(cost, names, np.array(amounts, dtype=float), error, prices)
 
