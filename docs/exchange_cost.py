@@ -23,7 +23,7 @@ from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law
 from shipid.study.schema import Cost
 
 Array = NDArray[np.float64]
-SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 800, 10, 2000
+SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 800, 4, 2000
 SHARES = np.geomspace(0.003, 10, 20)  # what a rule of thumb may be tuned to
 PILOT = 10  # runs of the fourth rule
 HEAD = """| goal | who decides | regret: mean [%] | median [%] | of the best rule's |
