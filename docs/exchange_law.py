@@ -11,7 +11,6 @@ import argparse
 import datetime
 import hashlib
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,24 +18,28 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from shipid import __version__
+from shipid import __version__, read_results
 from shipid.exchange.cells import read_cell_table
+from shipid.exchange.expect import study_cells
 from shipid.exchange.law import (
     FLAWS,
     LAW_FILE,
     RESPONSES,
+    ExchangeLaw,
     Hierarchy,
+    Response,
     feature_columns,
     fit_hierarchy,
     fit_law,
     response_rows,
     response_values,
     save_law,
+    ship_designs,
 )
 
 FORM = RESPONSES["H"]
 NEAREST = ("length", "froude")
-GAUSSIAN_ROWS = 1200  # of a Gaussian process: its price grows with the cube
+SEARCH_ROWS, GAUSSIAN_ROWS = 400, 1000  # of a Gaussian process: its price grows with the cube
 FIRST = 3  # amounts that are given before the others are foretold
 
 
@@ -51,37 +54,35 @@ def interval_of(part: Hierarchy, rows: pd.DataFrame, known: pd.DataFrame | None 
     return mean + middle, (high - low) / 2, np.array(np.nan)
 
 
-def left_out(cells: pd.DataFrame, column: str) -> Iterator[tuple[str, pd.DataFrame, pd.DataFrame]]:
-    """Each ship, or type: its name, the cells of the others and its own, with runs."""
-    for name in pd.unique(cells[column]):
-        mine = cells[column] == name
-        yield str(name), cells[~mine], response_rows(FORM, cells[mine])
-
-
 def score(error: np.ndarray, inside: np.ndarray) -> list[str]:
     """Of ln ratios (cells,): median factor, bias as a factor, and the share of cells inside."""
     return [f"{np.exp(np.median(np.abs(error))):.2f}", f"{np.exp(error.mean()):.2f}", f"{100 * inside.mean():.1f}"]
 
 
-def linear_form() -> object:
-    """The rival: the same effects, no floor beside them."""
-    return FORM._replace(floor=())
+class GaussianProcess:
+    """A Gaussian process over the numbers that the law has; its length scales are fitted once, to all ships."""
 
+    names = ("n", "a", "p", "h", "none", "froude", "size", *FLAWS)
 
-def gaussian_process(train: pd.DataFrame, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and half of the 95 % interval of a Gaussian process over the numbers that the law has."""
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    def __init__(self, cells: pd.DataFrame) -> None:
+        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-    names = ["n", "a", "p", "h", "none", "froude", "size", *FLAWS]
-    train = response_rows(FORM, train)
-    train = train.sample(min(GAUSSIAN_ROWS, len(train)), random_state=0)
-    inputs, asked = feature_columns(train, names), feature_columns(rows, names)
-    values = response_values(FORM, train)
-    kernel = ConstantKernel() * RBF(np.ones(len(names)), (0.1, 1e3)) + WhiteKernel(0.05)
-    process = GaussianProcessRegressor(kernel, normalize_y=True).fit(inputs, values)
-    mean, spread = process.predict(asked, return_std=True)
-    return mean, 1.96 * spread
+        kernel = ConstantKernel() * RBF(np.ones(len(self.names)), (0.1, 1e3)) + WhiteKernel(0.05)
+        self.kernel = self._fit(cells, SEARCH_ROWS, kernel=kernel).kernel_
+
+    def _fit(self, cells: pd.DataFrame, most: int, **options: object) -> object:
+        from sklearn.gaussian_process import GaussianProcessRegressor
+
+        rows = response_rows(FORM, cells)
+        rows = rows.sample(min(most, len(rows)), random_state=0)
+        process = GaussianProcessRegressor(normalize_y=True, **options)
+        return process.fit(feature_columns(rows, self.names), response_values(FORM, rows))
+
+    def foretell(self, others: pd.DataFrame, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and half of the 95 % interval (rows,) of ln(H / baseline), from the cells of other ships."""
+        process = self._fit(others, GAUSSIAN_ROWS, kernel=self.kernel, optimizer=None)
+        mean, spread = process.predict(feature_columns(rows, self.names), return_std=True)
+        return mean, 1.96 * spread
 
 
 def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
@@ -96,67 +97,95 @@ def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
     return values[[int((((known - one) * weights) ** 2).sum(axis=1).argmin()) for one in asked]]
 
 
-def judge(cells: pd.DataFrame, start: dict[str, Hierarchy]) -> None:
+def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
     """Print how well ships and types that were left out are foretold, by the law and its rivals."""
+    linear, rows_of = FORM._replace(floor=()), dict(tuple(response_rows(FORM, cells).groupby("ship", sort=False)))
+    designs = {form: ship_designs(form, cells) for form in (FORM, linear)}
+    starts = {FORM: part, linear: fit_hierarchy(linear, [*designs[linear].values()])}
     scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
-    rows_of_ships, biases = [], []
-    for column in ("ship", "type"):
-        for name, others, mine in left_out(cells, column):
-            part = fit_hierarchy(FORM, others, start["law"], 5)
-            for ship, rows in mine.groupby("ship"):
-                value = response_values(FORM, rows)
-                mean, half, of_mean = interval_of(part, rows)
-                error = value - mean
-                scores.setdefault(f"law, {column} left out", []).append((error, np.abs(error) <= half))
-                if column == "type":
-                    continue
-                inside = abs(error.mean()) <= of_mean
-                biases.append(inside)
-                rows_of_ships.append([str(ship), str(rows["type"].iloc[0]), f"{rows['length'].iloc[0]:.3g}",
-                                      *score(error, np.abs(error) <= half), "yes" if inside else "no"])  # fmt: skip
-                line = fit_hierarchy(linear_form(), others, start["linear"], 5)
-                mean, half, _ = interval_of(line, rows)
-                scores.setdefault("mixed model without a floor", []).append(
-                    (value - mean, np.abs(value - mean) <= half)
-                )
-                mean, half = gaussian_process(others, rows)
-                scores.setdefault("Gaussian process", []).append((value - mean, np.abs(value - mean) <= half))
-                error = value - nearest_curve(others, rows)
-                scores.setdefault("curve of the nearest ship", []).append((error, np.full(len(error), np.nan)))
-                amounts = sorted(rows["N_D"].unique())
-                known, later = rows[rows["N_D"].isin(amounts[:FIRST])], rows[rows["N_D"].isin(amounts[FIRST:])]
-                mean, half, _ = interval_of(part, later, known)
-                error = response_values(FORM, later) - mean
-                scores.setdefault("law, first three amounts given", []).append((error, np.abs(error) <= half))
-                _ = name
-    print("| foretold | median factor | bias | ships' median bias | inside 95 % |\n| --- | ---: | ---: | ---: | ---: |")
+    table, inside_biases, process = [], [], GaussianProcess(cells)
+
+    def fit_without(form: Response, absent: set[str]) -> Hierarchy:
+        return fit_hierarchy(form, [one for name, one in designs[form].items() if name not in absent], starts[form], 2)
+
+    def note(name: str, error: np.ndarray, half: np.ndarray) -> None:
+        scores.setdefault(name, []).append((error, np.where(np.isnan(half), np.nan, np.abs(error) <= half)))
+
+    for ship, rows in rows_of.items():
+        value, one, others = response_values(FORM, rows), fit_without(FORM, {ship}), cells[cells["ship"] != ship]
+        mean, half, of_mean = interval_of(one, rows)
+        error = value - mean
+        note("law, each ship left out", error, half)
+        inside_biases.append(abs(error.mean()) <= of_mean)
+        table.append([ship, str(rows["type"].iloc[0]), f"{rows['length'].iloc[0]:.3g}",
+                      *score(error, np.abs(error) <= half), "yes" if inside_biases[-1] else "no"])  # fmt: skip
+        mean, half, _ = interval_of(fit_without(linear, {ship}), rows)
+        note("mixed model without a floor", value - mean, half)
+        mean, half = process.foretell(others, rows)
+        note("Gaussian process", value - mean, half)
+        note("curve of the nearest ship", value - nearest_curve(others, rows), np.full(len(rows), np.nan))
+        first = rows["N_D"].isin(sorted(rows["N_D"].unique())[:FIRST])
+        mean, half, _ = interval_of(one, rows[~first], rows[first])
+        note("law, first three amounts given", value[~first] - mean, half)
+    for _, group in cells.groupby("type"):
+        absent = {*group["ship"]}
+        one = fit_without(FORM, absent)
+        for ship in absent & {*rows_of}:
+            mean, half, _ = interval_of(one, rows_of[ship])
+            note("law, each type left out", response_values(FORM, rows_of[ship]) - mean, half)
+    print("| foretold | median factor | bias | median bias of a ship | inside 95 % |")
+    print("| --- | ---: | ---: | ---: | ---: |")
     for name, parts in scores.items():
-        error, inside = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        factor, bias, held = score(*(np.concatenate([part[k] for part in parts]) for k in (0, 1)))
         typical = np.exp(np.median([abs(part[0].mean()) for part in parts]))
-        factor, bias, held = score(error, inside)
         print(f"| {name} | {factor} | {bias} | {typical:.2f} | {held} |")
-    print(f"\nThe bias of a ship lies inside its interval for {sum(biases)} of {len(biases)} ships.\n")
+    print(f"\nThe bias of a ship lies inside its interval for {sum(inside_biases)} of {len(inside_biases)} ships.\n")
     print("| ship left out | type | length [m] | median factor | bias | inside 95 % | bias inside |")
     print("| --- | --- | ---: | ---: | ---: | ---: | --- |")
-    for row in rows_of_ships:
+    for row in table:
         print(f"| {' | '.join(row)} |")
 
 
 def print_kinds(part: Hierarchy) -> None:
-    """Print how much larger H is at equal A for each kind of error, against the mean of four kinds, with 95 %."""
-    four = ("damping", "mass", "thrust", "missing")
-    print("\n| what is wrong | 2 runs | 8 runs | 32 runs |\n| --- | ---: | ---: | ---: |")
-    for kind in FLAWS:
-        texts = []
-        for runs in (2, 8, 32):
-            weights = np.zeros(len(part.theta))
-            for name, weight in [(kind, 1.0), *((one, -1 / len(four)) for one in four)]:
-                weights[FORM.features.index(name)] += weight
-                weights[FORM.features.index(f"{name}:n")] += weight * np.log(runs / 8)
-            value, error = weights @ part.theta, np.sqrt(weights @ part.covariance @ weights)
-            low, high = value - 1.96 * error, value + 1.96 * error
-            texts.append(f"{np.exp(value):.2f} [{np.exp(low):.2f}, {np.exp(high):.2f}]")
-        print(f"| {kind} | {' | '.join(texts)} |")
+    """Print H for each kind of error over the mean of four kinds, where A is the baseline and the floor a third of it.
+
+    Two ship lengths ahead; 95 % intervals over ships.
+    """
+    print(
+        "\nH for each kind over the mean of damping, mass, thrust and missing, at equal A (the baseline), 2 lengths:\n"
+    )
+    print("| what is wrong | 2 runs | 8 runs | 32 runs |\n| --- | ---: | ---: | ---: |")
+    same = {"A": 1.0, "baseline": 1.0, "floor": 1 / 3, "ahead": 2.0, "froude": 0.2, "length": 50.0}
+    texts: dict[str, list[str]] = {kind: [] for kind in FLAWS}
+    for runs in (2, 8, 32):
+        mean, jacobian = part.mean(pd.DataFrame([{"kind": kind, "N_D": runs, **same} for kind in FLAWS]))
+        four = [FLAWS.index(kind) for kind in ("damping", "mass", "thrust", "missing")]
+        mean, jacobian = mean - mean[four].mean(), jacobian - jacobian[four].mean(axis=0)
+        errors = 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", jacobian, part.covariance, jacobian))
+        for kind, value, error in zip(FLAWS, mean, errors, strict=True):
+            texts[kind].append("{:.2f} [{:.2f}, {:.2f}]".format(*np.exp([value, value - error, value + error])))
+    for kind, row in texts.items():
+        print(f"| {kind} | {' | '.join(row)} |")
+
+
+def print_unseen(law: ExchangeLaw, folders: list[Path]) -> None:
+    """Print H of recorded ships, which taught the law nothing, beside what it expects of their A and baseline."""
+    print("\n| recorded | physics | A [m] | runs | H [m] | expected | 95 % | inside |")
+    print("| --- | --- | ---: | ---: | ---: | ---: | --- | --- |")
+    inside = []
+    for folder in folders:
+        cells, ship = study_cells(read_results(folder))
+        for name, rows in cells.groupby("foundation", sort=False):
+            kind, error = rows[["kind", "A"]].iloc[0]
+            physics = error if kind == "" else (kind, error)
+            draws = law.expect(ship, physics, [*rows["N_D"]], float(rows["ahead"].iloc[0]), 1000)
+            for row, (low, middle, high) in zip(
+                rows.to_dict("records"), np.quantile(draws, [0.025, 0.5, 0.975], axis=0).T, strict=True
+            ):
+                inside.append(low <= row["H"] <= high)
+                words = f"{row['H']:.3g} | {middle:.2g} | {low:.2g} to {high:.2g} | {'yes' if inside[-1] else 'no'}"
+                print(f"| {folder.name} | {name} | {error:.3g} | {row['N_D']} | {words} |")
+    print(f"\nInside: {sum(inside)} of {len(inside)}.")
 
 
 def main() -> None:
@@ -164,6 +193,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cells", type=Path)
     parser.add_argument("--write", action="store_true", help="write the law that comes with shipid")
+    parser.add_argument("--unseen", type=Path, nargs="*", help="folders of studies of recorded ships")
     given = parser.parse_args()
     warnings.filterwarnings("ignore", module="sklearn")
     cells = read_cell_table(given.cells)
@@ -190,8 +220,10 @@ def main() -> None:
     for (level, feature), variance in zip(FORM.levels, part.variances, strict=True):
         print(f"| {level} | {feature} | {np.sqrt(variance):.3f} |")
     print_kinds(part)
-    print()
-    judge(cells, {"law": part, "linear": fit_hierarchy(linear_form(), cells)})
+    if given.unseen:
+        print_unseen(law, given.unseen)
+    print(flush=True)
+    judge(cells, part)
 
 
 if __name__ == "__main__":

@@ -40,6 +40,8 @@ def expect_command(
     exchange, amounts = read_law(law) if law else read_law(), sorted({*(runs or [4, 12, 40])})
     if sea:
         check_choice("--sea", sea, SEAS)
+        if vessel or study:
+            raise ShipidError("goes with --length and --speed: a vessel or a study has its own sea", path="--sea")
     for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
         if number is not None and not 0 < number < 1e6:
             raise ShipidError(f"{number:g}: must be above 0", path=option)
@@ -61,7 +63,7 @@ def expect_command(
             ship = UnseenShip(length, speed, sea=sea)
     table = expect.expected_errors(exchange, ship, foundations, amounts, ahead)
     with open_answer(as_json) as answer:
-        sentence = expect.expectation_sentence(table.iloc[len(amounts) // 2], ship, ahead)
+        sentence = expect.expectation_sentence(table.iloc[0 if runs else len(amounts) // 2], ship, ahead)
         answer.say(sentence, sentence=sentence)
         answer.warn(expect.extrapolation_sentences(exchange, ship, foundations, amounts, ahead))
         answer.records("expected", table, HEADS)

@@ -28,7 +28,6 @@ Array = np.ndarray
 Physics = str | float | tuple[str, float]
 """A kind of physics of `CELL_KINDS` or `LIKELY`, its A [m], or both."""
 LAW_FILE = Path(__file__).with_name("law.json")
-LAW_DIGITS = 8  # of numbers in the file: rounding moves a prediction by less than 1e-5
 
 
 class Response(NamedTuple):
@@ -211,7 +210,7 @@ def response_rows(response: Response, cells: pd.DataFrame) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class _Design:
+class ShipDesign:
     """Rows of one ship, sorted by cell: values (rows,), both features, and what makes their covariance.
 
     effects (rows, G) with their levels (G,), all but those of a cell and a row. starts, counts (cells,): rows of each
@@ -228,7 +227,8 @@ class _Design:
     weights: Array
 
     @classmethod
-    def of(cls, response: Response, cells: pd.DataFrame) -> _Design:
+    def of(cls, response: Response, cells: pd.DataFrame) -> ShipDesign:
+        """Design of the rows of one ship."""
         rows = cells.iloc[np.argsort(group_codes(cells, CELL), kind="stable")]
         features = feature_columns(rows, [feature for _, feature in response.levels])
         effects, levels = [], []
@@ -259,8 +259,14 @@ class _Design:
         return np.asarray((columns - np.repeat(shrink[:, None] * means, self.counts, axis=0)) / np.sqrt(rest))
 
 
+def ship_designs(response: Response, cells: pd.DataFrame) -> dict[str, ShipDesign]:
+    """Ship -> design of the cells that teach a response."""
+    ships = response_rows(response, cells).groupby("ship", sort=False)
+    return {str(name): ShipDesign.of(response, part) for name, part in ships}
+
+
 def fit_hierarchy(
-    response: Response, cells: pd.DataFrame, start: Hierarchy | None = None, rounds: int = 100
+    response: Response, ships: Sequence[ShipDesign], start: Hierarchy | None = None, rounds: int = 100
 ) -> Hierarchy:
     """Fit a response to the cells of many ships by restricted maximum likelihood and Gaussian priors.
 
@@ -271,8 +277,6 @@ def fit_hierarchy(
 
     start : a fit to begin with. rounds : at most; they end where no standard deviation changes by more than 1 %.
     """
-    every = response_rows(response, cells)
-    ships = [_Design.of(response, part) for _, part in every.groupby("ship", sort=False)]
     centre, widths = prior_of(response)
     theta = start.theta if start else centre
     variances = start.variances if start else np.full(len(response.levels), 0.03)
@@ -293,7 +297,7 @@ def prior_of(response: Response) -> tuple[Array, Array]:
 
 
 def _improve(
-    response: Response, ships: Sequence[_Design], theta: Array, variances: Array, centre: Array, prior: Array
+    response: Response, ships: Sequence[ShipDesign], theta: Array, variances: Array, centre: Array, prior: Array
 ) -> tuple[Array, Array, Array]:
     """Theta after one step, its covariance, and the factors (levels,) of the variances."""
     inner = np.array([level == CELL for level, _ in response.levels])
@@ -468,12 +472,11 @@ def _cells_to_draw(
     return pd.DataFrame(rows)
 
 
-def fit_law(cells: pd.DataFrame, start: ExchangeLaw | None = None, rounds: int = 100) -> ExchangeLaw:
+def fit_law(cells: pd.DataFrame) -> ExchangeLaw:
     """Fit the law to the cells of many ships; see `fit_hierarchy`."""
     cells = check_cells(cells)
     parts = {
-        name: fit_hierarchy(response, cells, start.parts[name] if start else None, rounds)
-        for name, response in RESPONSES.items()
+        name: fit_hierarchy(response, [*ship_designs(response, cells).values()]) for name, response in RESPONSES.items()
     }
     sizes = cells.assign(A=cells["A"] / cells["length"])
     limits = {name: (float(sizes[name].min()), float(sizes[name].max())) for name in LIMITED}
@@ -487,16 +490,11 @@ def save_law(law: ExchangeLaw, file: Path) -> None:
             "features": list(part.response.features),
             "levels": [" : ".join(level) for level in part.response.levels],
         }
-        | {key: _round_numbers(getattr(part, key)) for key in ("theta", "covariance", "variances")}
+        | {key: getattr(part, key) for key in ("theta", "covariance", "variances")}
         | {"ships": part.ships}
         for name, part in law.parts.items()
     }
     write_json(file, {"parts": parts, "limits": law.limits, "provenance": law.provenance})
-
-
-def _round_numbers(values: Array) -> list[Any]:
-    """Numbers of an array, rounded, as nested lists."""
-    return [_round_numbers(one) if np.ndim(one) else float(f"{one:.{LAW_DIGITS}g}") for one in values]
 
 
 def read_law(file: Path = LAW_FILE) -> ExchangeLaw:

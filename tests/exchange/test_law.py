@@ -19,6 +19,7 @@ from shipid.exchange.law import (
     response_rows,
     response_values,
     save_law,
+    ship_designs,
 )
 from tests.exchange.drawn_cells import TRUE_SPREAD, TRUE_THETA, draw_cells, true_law
 
@@ -85,7 +86,7 @@ def test_units_and_the_order_of_rows_do_not_matter(law, cells):
     metres = ["A", "H", "baseline", "floor", "length"]
     other = cells.sample(frac=1, random_state=3)
     other[metres] *= 10.0
-    other = fit_hierarchy(RESPONSES["H"], other)
+    other = fit_hierarchy(RESPONSES["H"], [*ship_designs(RESPONSES["H"], other).values()])
     assert other.theta == pytest.approx(law.parts["H"].theta, abs=1e-6)
 
 
@@ -97,7 +98,7 @@ def covered(draws, true, level):
 @pytest.mark.parametrize("known", [0, 3], ids=["before any run", "after three amounts"])
 def test_intervals_hold_on_ships_that_it_has_not_seen(law, known):
     shares = []
-    for _, ship in draw_cells(24, 2, KINDS).groupby("ship"):
+    for _, ship in draw_cells(14, 2, KINDS).groupby("ship"):
         rows = ship[ship["ahead"] == 2.0].sort_values(["foundation", "N_D"])
         amounts = sorted(set(rows["N_D"]))
         asked = UnseenShip(*rows[["length", "speed", "baseline", "floor"]].iloc[0])
