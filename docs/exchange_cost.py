@@ -1,7 +1,7 @@
 """The advice on what to buy, as a decision: its regret in cost against rules of thumb, over ships that it has not seen.
 
-`python docs/records.py exchange-cost python docs/exchange_cost.py [CELLS]` writes the record: of ships drawn from a
-known law, and of those of a table of cells, each left out of the law that advises on it. Prices and goals are drawn
+`python docs/records.py exchange-cost python docs/exchange_cost.py CELLS` writes the record, of the ships of a table of
+cells, each left out of the law that advises on it; without CELLS ships are drawn from a known law. Prices and goals are drawn
 by seed. Each rule of thumb has one number, which is tuned on the other ships and then frozen.
 """
 
