@@ -1,8 +1,8 @@
 """The advice on what to buy, as a decision: its regret in cost against rules of thumb, over ships that it has not seen.
 
 `python docs/records.py exchange-cost python docs/exchange_cost.py CELLS` writes the record, of the ships of a table of
-cells, each left out of the law that advises on it; without CELLS ships are drawn from a known law. Prices and goals are drawn
-by seed. Each rule of thumb has one number, which is tuned on the other ships and then frozen.
+cells, each left out of the law that advises on it; without CELLS ships are drawn from a known law.
+Prices and goals are drawn by seed. Each rule of thumb has one number, which is tuned on the other ships and then frozen.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law
 from shipid.study.schema import Cost
 
 Array = NDArray[np.float64]
-SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 800, 4, 2000
+SEED, DRAWS, INSTANCES, RESAMPLES = 61_2026, 800, 10, 2000
 SHARES = np.geomspace(0.003, 10, 20)  # what a rule of thumb may be tuned to
 PILOT = 10  # runs of the fourth rule
 HEAD = """| goal | who decides | regret: mean [%] | median [%] | of the best rule's |
