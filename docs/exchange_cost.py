@@ -2,7 +2,7 @@
 
 `python docs/records.py exchange-cost python docs/exchange_cost.py CELLS` writes the record, of the ships of a table of
 cells, each left out of the law that advises on it; without CELLS ships are drawn from a known law.
-Prices and goals are drawn by seed. Each rule of thumb has one number, which is tuned on the other ships and then frozen.
+Prices and goals are drawn by seed. Each rule of thumb has one number, tuned on the other ships and then frozen.
 """
 
 from __future__ import annotations
