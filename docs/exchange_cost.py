@@ -358,11 +358,10 @@ def errors_of_ship(ship: pd.DataFrame) -> Array:
 def knowledge_of_law(cells: pd.DataFrame, ships: Mapping[str, pd.DataFrame]) -> Knowledge:
     """Draws of the law fitted to the ships of the other folds, given what is seen of the ship itself."""
     names = np.random.default_rng(SEED).permutation(sorted(ships))
-    whole = fit_law(cells)
     laws: dict[str, ExchangeLaw] = {}
     for fold in range(FOLDS):
         out = names[fold::FOLDS]
-        laws |= dict.fromkeys(out, fit_law(cells[~cells["ship"].isin(out)], whole))
+        laws |= dict.fromkeys(out, fit_law(cells[~cells["ship"].isin(out)]))
 
     @lru_cache(None)
     def draws(ship: str, _seen: bytes, place: int, mask: tuple[bool, ...]) -> Array:
