@@ -62,6 +62,7 @@ __all__ = [
     "estimates",
     "factors",
     "free_runs",
+    "frontier",
     "gain",
     "histories",
     "motion",
@@ -97,6 +98,11 @@ def gain(
     """
     content = content_of(source)
     return _draw("gain", content, [statistic, scale], dark=dark, lack=gain_lack(content))
+
+
+def frontier(source: Source, *, dark: bool = False) -> go.Figure:
+    """Expected error at the horizon over the price, a line per physics; needs a study with `[cost]`."""
+    return _draw("frontier", content_of(source), dark=dark, lack="the study has no [cost], or no cell with a result")
 
 
 def coverage(source: Source, N_D: int | None = None, *, dark: bool = False) -> go.Figure:

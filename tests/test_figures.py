@@ -21,6 +21,7 @@ from shipid.study.results import read_results
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family
 from tests.report import test_checks, test_identification, test_motion, test_shares
+from tests.report.test_cost import priced
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
@@ -33,7 +34,7 @@ OTHERS = {
 
 @pytest.fixture(scope="module")
 def content(tiny_run: Path) -> ReportContent:
-    return report_content(read_results(tiny_run))
+    return priced(report_content(read_results(tiny_run)), per_metre=30.0)
 
 
 def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent) -> None:

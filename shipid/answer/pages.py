@@ -14,8 +14,9 @@ from shipid.answer import bands, frames, methods, sentences
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
 from shipid.errors import ResultError
+from shipid.exchange import cost
 from shipid.exchange.shares import shares_frame
-from shipid.files import read_json, write_table, write_text
+from shipid.files import read_json, write_json, write_table, write_text
 from shipid.metrics import summarise_errors
 from shipid.report import AnswerSentence, ReportContent, summary_text, write_report
 from shipid.report.methods import MethodsContent, sentences_on_methods, write_comparison
@@ -28,7 +29,8 @@ from shipid.study.results import Results, read_results
 
 Say = Callable[[str], object]
 REPAIR_COLUMNS = ["kind", "column", "count", "note"]
-ANSWER, SUMMARY, REPORT, METHODS, SHARES = "answer.txt", "summary.md", "report.html", "methods.csv", "shares.csv"
+ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
+SHARES, COST = "shares.csv", "cost.json"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
     "regression": frames.regression_frame,
@@ -36,6 +38,7 @@ REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "no_band": bands.refused_frame,
     "methods": methods.compare_methods,
     "shares": shares_frame,
+    "cost": cost.cost_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
@@ -46,6 +49,7 @@ def report_content(results: Results) -> ReportContent:
     words = (
         *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
         *bands.answer_on_bands(results, tables["coverage"]),
+        *((text, "frontier") for text in cost.cost_sentences(results)),
     )
     best, models = sentences.best_model(results), results.models
     if (NO_MODEL, verdict_method(plan)) not in {(name, way.name) for name, way in plan.pairs}:
@@ -101,6 +105,9 @@ def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_text(folder / SUMMARY, summary_text(content))
     write_table(folder / SHARES, content.frame("shares"))
+    if len(ways := content.frame("cost")):
+        said = [sentence.text for sentence in content.answer if sentence.figure == "frontier"]
+        write_json(folder / COST, {"answer": said, "ways": ways.to_dict("records")})
     return write_report(content, folder / REPORT)
 
 

@@ -9,6 +9,7 @@ import pandas as pd
 
 from shipid.errors import DataError
 from shipid.files import open_file
+from shipid.study.schema import KINDS_OF_PHYSICS
 
 CELL_COLUMNS = {
     "ship": "name",
@@ -26,7 +27,7 @@ CELL_COLUMNS = {
     "baseline": "m, error of constant u, v, r on the same windows",
     "floor": "m, A of the true 3-DOF physics, blind to sea and sensors",
 }
-CELL_KINDS = ("nominal", "damping", "mass", "thrust", "missing", "moderate", "high", "template", "sister", "none")
+CELL_KINDS = (*KINDS_OF_PHYSICS, "none")
 NUMBERS = ("length", "speed", "froude", "N_D", "ahead", "H", "baseline", "floor")
 
 

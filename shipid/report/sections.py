@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shipid.report import bands, errors_over, factors, logs, methods, paths, physics_and_data, search, shares
+from shipid.report import bands, cost, errors_over, factors, logs, methods, paths, physics_and_data, search, shares
 from shipid.report.content import ReportContent
 from shipid.report.page import HEAD, Section, write_page
 
 SECTIONS: dict[str, Section] = {
     HEAD: paths.AT_A_GLANCE,
     "results": physics_and_data.WHAT_PHYSICS_AND_DATA_BUY,
+    "cost": cost.WHAT_TO_BUY,
     "errors": errors_over.WHERE_ERRORS_GROW,
     "how-far-off": bands.HOW_FAR_OFF,
     "the-methods": methods.THE_METHODS,

@@ -18,7 +18,7 @@ from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Simulator
 from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
-from shipid.study.schema import PAIRED_ROLES, MeanBlock, Study
+from shipid.study.schema import KINDS_OF_PHYSICS, PAIRED_ROLES, MeanBlock, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, change_structure, draw_members, resolve_families
 from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
@@ -337,3 +337,17 @@ def check_claims(study: Study, models: Sequence[Foundation]) -> None:
         raise DocumentError(
             f"{nominal.name!r} is perturbed: the nominal model must be the base as it is", path="claims.nominal"
         )
+
+
+def check_cost(study: Study, models: Sequence[Foundation]) -> None:
+    """Refuse the price of physics that is no family of the study and no kind of the law of exchange."""
+    known = {
+        *KINDS_OF_PHYSICS,
+        "model-test",
+        "identified",
+        *(model.family for model in models if model.base is not None),
+    }
+    for name in study.cost.foundations if study.cost else ():
+        if name not in known:
+            words = f"{name!r} is no family of this study and no kind of physics: {suggest_name(name, known)}"
+            raise DocumentError(words, path=f"cost.foundations.{name}")

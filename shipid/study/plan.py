@@ -34,6 +34,7 @@ from shipid.study.declared import (
     Foundation,
     StudyMethod,
     check_claims,
+    check_cost,
     check_file_names,
     foundations_of,
     methods_of,
@@ -390,6 +391,7 @@ def _check_and_expand(
     foundations = foundations_of(study, file, known, simulators, trust)
     methods = methods_of(study, foundations)
     check_claims(study, foundations)
+    check_cost(study, foundations)
     batches = tuple(
         Batch(amount, seed) for amount in sorted(set(study.grid.N_D), reverse=True) for seed in study.seeds_of(amount)
     )

@@ -159,6 +159,34 @@ class Claims(Strict):
         return {*self.aside, *([self.nominal] if self.nominal else [])}
 
 
+KINDS_OF_PHYSICS = ("nominal", "damping", "mass", "thrust", "missing", "moderate", "high", "template", "sister")
+"""What may be wrong with the physics of a ship that the law of exchange knows; nominal: nothing."""
+Price = Annotated[FiniteFloat, Field(ge=0)]
+
+
+class Cost(Strict):
+    """`[cost]`: what data and physics cost, in money or hours, and the goal they are bought for."""
+
+    unit: Annotated[str, Field(min_length=1, max_length=20, description="of every price, such as EUR or h")]
+    run: Annotated[FiniteFloat, Field(gt=0, description="of one recorded run")]
+    mobilisation: Price = Field(default=0.0, description="paid once, before the first run")
+    per_metre: Annotated[FiniteFloat, Field(gt=0)] | None = Field(
+        default=None, description="what a metre of mean error at the horizon costs"
+    )
+    H_end_required: Annotated[FiniteFloat, Field(gt=0)] | None = Field(
+        default=None, description="m, mean error at the horizon that is good enough"
+    )
+    foundations: dict[str, Price] = Field(
+        default={}, description="price of each physics, by family or by kind: template, sister, ...; no physics is free"
+    )
+
+    @model_validator(mode="after")
+    def _one_goal(self) -> Cost:
+        if (self.per_metre is None) == (self.H_end_required is None):
+            raise ValueError("give either `per_metre` or `H_end_required`")
+        return self
+
+
 class PublishedEnvelope(Strict):
     """`[published]`: the input envelope that others report, to be shown beside that of the study."""
 
@@ -224,6 +252,7 @@ class Study(Strict):
     method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
     claims: Claims | None = None
     published: PublishedEnvelope | None = None
+    cost: Cost | None = None
     bands: BandsBlock = BandsBlock()
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     families: str | None = Field(default=None, description="a document of families that come first: a path, or a study")
