@@ -65,6 +65,6 @@ def expect_command(
     with open_answer(as_json) as answer:
         sentence = expect.expectation_sentence(table.iloc[0 if runs else len(amounts) // 2], ship, ahead)
         answer.say(sentence, sentence=sentence)
-        answer.warn(expect.extrapolation_sentences(exchange, ship, foundations, amounts, ahead))
+        answer.warn(expect.sentences_on_limits(exchange, ship, foundations, amounts, ahead))
         answer.records("expected", table, HEADS)
         answer.say(expect.LIMITS.format(**exchange.provenance), law=exchange.provenance)

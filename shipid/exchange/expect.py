@@ -120,7 +120,7 @@ def expectation_sentence(row: pd.Series[Any], ship: UnseenShip, ahead: float) ->
     )
 
 
-def extrapolation_sentences(
+def sentences_on_limits(
     law: ExchangeLaw, ship: UnseenShip, foundations: Sequence[Physics], amounts: Sequence[int], ahead: float
 ) -> list[str]:
     """What lies outside the ships that the law was learned from, a sentence for each."""

@@ -41,10 +41,10 @@ def test_the_sentence_says_runs_physics_interval_and_horizon(law):
 
 
 def test_it_says_itself_what_is_extrapolated(law):
-    inside = expect.extrapolation_sentences(law, SHIP, ["template", 30.0], [1, 64], 2.0)
+    inside = expect.sentences_on_limits(law, SHIP, ["template", 30.0], [1, 64], 2.0)
     assert inside == []
     small = UnseenShip(0.5, 2.2)
-    words = "\n".join(expect.extrapolation_sentences(law, small, [9.0], [0, 200], 9.0))
+    words = "\n".join(expect.sentences_on_limits(law, small, [9.0], [0, 200], 9.0))
     for name, value in {
         "length [m]": "0.5",
         "Froude number": "0.993",
