@@ -45,6 +45,12 @@ def expect_command(
     for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
         if number is not None and not 0 < number < 1e6:
             raise ShipidError(f"{number:g}: must be above 0", path=option)
+    given = {"--kind": kind, "--A": a, "--length": length, "--speed": speed, "--vessel": vessel}
+    idle = list(given) if study else ["--length", "--speed"] if vessel else []
+    for option in idle:
+        if given[option] is not None:
+            kept = "--study has its own ship and physics" if study else "--vessel has its own"
+            raise ShipidError(f"{kept}: leave one of the two out", path=option)
     if study is not None:
         import shipid
 
@@ -58,7 +64,8 @@ def expect_command(
         if vessel is not None:
             ship = expect.meet_ship(vessel, ahead, Path("expect.toml"))
         elif length is None or speed is None:
-            raise ShipidError("missing: give --length and --speed, or --vessel, or --study", path="--length")
+            option = "--length" if length is None else "--speed"
+            raise ShipidError("missing: give --length and --speed, or --vessel, or --study", path=option)
         else:
             ship = UnseenShip(length, speed, sea=sea)
     table = expect.expected_errors(exchange, ship, foundations, amounts, ahead)

@@ -112,10 +112,12 @@ def likely_physics(kinds: Sequence[str] | None, error: float | None) -> list[Phy
 def expectation_sentence(row: pd.Series[Any], ship: UnseenShip, ahead: float) -> str:
     """One row of `expected_errors` in a plain sentence."""
     seconds = ahead * ship.length / (USUAL_SPEED * ship.speed)
+    seconds_text = f"{seconds:.0f}" if seconds >= 100 else f"{seconds:.3g}"
     low, middle, high = (significant_digits(float(row[name]), 2) for name in ("low", "H", "high"))
+    share = "95 % of ships" if ship.baseline is None else "95 % interval"
     return (
         f"With {row['N_D']} {plural_word(row['N_D'], 'run')} and this physics ({row['physics']}), expect the path to "
-        f"err by {middle} m, 95 % of ships {low} to {high} m, in the mean over the next {seconds:.3g} s "
+        f"err by {middle} m, {share} {low} to {high} m, in the mean over the next {seconds_text} s "
         f"({ahead:.3g} ship lengths)."
     )
 

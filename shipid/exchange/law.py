@@ -506,7 +506,10 @@ def save_law(law: ExchangeLaw, file: Path) -> None:
 
 def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
     """Read the law that comes with shipid, or another one; ResultError for a file of other features or none."""
-    content, parts = read_json(file), {}
+    try:
+        content, parts = read_json(file), {}
+    except ResultError as error:
+        raise ResultError("cannot be read, or is no JSON: give the path of a law.json", file=file) from error
     try:
         for name, response in RESPONSES.items():
             part = content["parts"][name]

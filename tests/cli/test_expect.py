@@ -37,7 +37,7 @@ def test_a_study_is_foretold_at_more_runs(tiny_run: Path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("--length 120", "--length: missing: give --length and --speed, or --vessel, or --study"),
+        ("--length 120", "--speed: missing: give --length and --speed, or --vessel, or --study"),
         ("--length -3 --speed 7", "--length: -3: must be above 0"),
         (
             "--length 120 --speed 7 --kind guess",

@@ -37,7 +37,10 @@ def test_the_sentence_says_runs_physics_interval_and_horizon(law):
     words = expect.expectation_sentence(table.iloc[0], SHIP, 2.0)
     assert words.startswith("With 1 run and this physics (template, A 40.00 m), expect the path to err by ")
     assert words.endswith("in the mean over the next 38.1 s (2 ship lengths).")
-    assert "m, 95 % of ships " in words
+    assert "m, 95 % interval " in words, "one ship is asked: its baseline is known"
+    unseen = expect.expectation_sentence(table.iloc[0], UnseenShip(SHIP.length, SHIP.speed), 100.0)
+    assert "m, 95 % of ships " in unseen
+    assert "the next 1905 s (100 ship lengths)" in unseen
 
 
 def test_it_says_itself_what_is_extrapolated(law):
