@@ -139,9 +139,12 @@ class Hierarchy:
         """ln(value / unit) (rows,) without effects, and its derivatives (rows, P) by theta."""
         return mean_of_features(self.theta, *_both_features(self.response, cells))
 
-    def spread(self, cells: pd.DataFrame, jacobian: Array) -> Array:
-        """Covariance (rows, rows) of cells of one ship: effects, rest, and what is unknown of theta."""
-        parts = zip(self.variances, _kernels(self.response, cells), strict=True)
+    def spread(self, cells: pd.DataFrame, jacobian: Array, known: int = 0) -> Array:
+        """Covariance (rows, rows) of cells of one ship: effects, rest, and what is unknown of theta.
+
+        known : rows at the beginning whose runs and tests are others than those of the remaining rows.
+        """
+        parts = zip(self.variances, _kernels(self.response, cells, known), strict=True)
         return np.asarray(sum((one * kernel for one, kernel in parts), jacobian @ self.covariance @ jacobian.T))
 
     def deviations(
@@ -149,12 +152,14 @@ class Hierarchy:
     ) -> Array:
         """Student draws (draws, rows) of value less `mean` for cells of one ship, given those of its cells in `own`.
 
-        Known cells move them and make them narrower; ones that are further off than expected make them wider.
+        Known cells move them and make them narrower; ones that are further off than expected make them wider. What is
+        drawn has other runs and another test, so that a cell that is known does not come out as it was measured.
         """
         known = cells.head(0) if own is None else response_rows(self.response, own)
         joined = pd.concat([known, cells], ignore_index=True)
         mean, jacobian = self.mean(joined)
-        spread, count, freedom = self.spread(joined, jacobian), len(known), self.freedom
+        count, freedom = len(known), self.freedom
+        spread = self.spread(joined, jacobian, count)
         centre = np.zeros(len(cells))
         if count:
             gain = np.linalg.solve(spread[:count, :count], spread[:count, count:]).T
@@ -189,11 +194,13 @@ def mean_of_features(theta: Array, features: Array, floor: Array) -> tuple[Array
     return total, np.hstack([share * features, (1 - share) * floor])
 
 
-def _kernels(response: Response, cells: pd.DataFrame) -> list[Array]:
-    """Covariances (rows, rows) of the effects of cells of one ship, at variance one."""
+def _kernels(response: Response, cells: pd.DataFrame, known: int = 0) -> list[Array]:
+    """Covariances (rows, rows) of the effects of cells of one ship, at variance one; `known` as in `spread`."""
     features = feature_columns(cells, [feature for _, feature in response.levels])
     codes = {level: group_codes(cells, level) for level, _ in response.levels}
-    same = {level: code[:, None] == code for level, code in codes.items()}
+    earlier = np.arange(len(cells)) < known
+    alike = earlier[:, None] == earlier
+    same = {level: (code[:, None] == code) & (alike | ("N_D" not in level)) for level, code in codes.items()}
     return [
         same[level] * np.outer(column, column) for (level, _), column in zip(response.levels, features.T, strict=True)
     ]
@@ -371,7 +378,7 @@ class ExchangeLaw:
     own: pd.DataFrame | None = None
 
     def given(self, own: pd.DataFrame) -> ExchangeLaw:
-        """The law of one ship, of which some cells are known: what `expect` draws agrees with them."""
+        """The law of one ship, of which some cells are known: see `Hierarchy.deviations`."""
         return replace(self, own=check_cells(own))
 
     def expect(

@@ -77,8 +77,8 @@ def test_a_study_conditions_the_law(law, tiny_run: Path):
     mine = results.table()
     known = table[table["N_D"].isin(mine.columns)]
     for row in known.to_dict("records"):
-        assert row["H"] == pytest.approx(mine.loc[row["physics"], row["N_D"]], rel=1e-3)
-        assert row["high"] == pytest.approx(row["low"], rel=1e-2)
+        assert row["low"] <= mine.loc[row["physics"], row["N_D"]] <= row["high"]
+        assert (row["low"] < row["high"]) == (row["N_D"] > 0)
 
 
 def test_a_vessel_is_met_in_simulation(tmp_path: Path):

@@ -115,12 +115,19 @@ def test_intervals_hold_on_ships_that_it_has_not_seen(law, known):
     assert 0.37 < narrow < 0.63
 
 
-def test_known_cells_are_repeated_and_a_surprising_ship_is_less_certain(law, cells):
+def test_a_known_cell_is_one_draw_of_runs_and_a_surprising_ship_is_less_certain(law, cells):
+    """A cell that was measured came out with an interval of no width, and one run more was worse."""
     ship = cells[(cells["ship"] == "ship-3") & (cells["ahead"] == 1.0)]
     own, asked = ship[ship["N_D"] <= 4], UnseenShip(100.0, 7.0)
     known = own[own["foundation"] == "mass-2"].set_index("N_D")
-    draws = law.given(own).expect(asked, "mass-2", [0, 1, 2, 4], 1.0, 50)
-    assert draws == pytest.approx(np.broadcast_to([known["A"].iloc[0], *known["H"]], draws.shape), rel=1e-4)
+    draws = law.given(own).expect(asked, "mass-2", [0, 1, 2, 4, 5], 1.0, 1000)
+    assert draws[:, 0] == pytest.approx(known["A"].iloc[0])
+    low, middle, high = np.log(np.quantile(draws[:, 1:], [0.025, 0.5, 0.975], axis=0))
+    assert (low[:3] < np.log(known["H"])).all()
+    assert (np.log(known["H"]) < high[:3]).all()
+    assert (np.diff(middle) < 0.02).all(), "more runs do not make it worse"
+    assert (high - low)[2] == pytest.approx((high - low)[3], rel=0.15), "four runs that are known, or five"
+    assert (high - low)[2] < np.ptp(np.log(np.quantile(law.expect(asked, "mass", [4], 1.0, 1000), [0.025, 0.975])))
     wild = own.assign(H=own["H"] * np.exp(np.resize([-1, 1, 0, 2], len(own))))
     widths = [np.log(law.given(one).expect(asked, "mass-2", [64], 1.0, 500)).std() for one in (own, wild)]
     assert widths[1] > 2 * widths[0]
