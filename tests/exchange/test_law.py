@@ -154,8 +154,10 @@ def test_a_law_is_written_and_read(law, tmp_path):
     one, two = (each.expect(asked, "template", [0, 4], 2.0, 100) for each in (law, other))
     assert np.quantile(two, [0.1, 0.5, 0.9]) == pytest.approx(np.quantile(one, [0.1, 0.5, 0.9]), rel=1e-3)
     assert other.limits == law.limits
+    assert other.provenance["ships"] == 16
     text = (tmp_path / "law.json").read_text()
-    for words in ("{}", "[1]", text.replace('"a:n"', '"a:p"'), text.replace('"limits"', '"limit"')):
+    changes = ('"a:n"', '"a:p"'), ('"none:few"', '"p:few"'), ('"ship : h"', '"ship : n"'), ('"A": [', '"B": [')
+    for words in ("{}", "[1]", *(text.replace(*one) for one in (*changes, ('"limits"', '"limit"')))):
         (tmp_path / "law.json").write_text(words)
         with pytest.raises(ResultError, match=r"law\.json: "):
             read_law(tmp_path / "law.json")
