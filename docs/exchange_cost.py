@@ -369,6 +369,7 @@ def knowledge_of_law(cells: pd.DataFrame, ships: Mapping[str, pd.DataFrame]) -> 
         one, kinds = mine.iloc[0], kinds_of_ship(mine)
         paid = [kind for kind, bought in zip(kinds, mask, strict=True) if bought]
         known = mine[mine["kind"].isin(paid) & (mine["N_D"] <= amounts[place])]
+        known = known.assign(floor=known["A"][known["kind"] == "nominal"].mean())  # seen of the true physics alone
         law = laws[ship].given(known) if place else laws[ship]
         called = mine.drop_duplicates("kind").set_index("kind")["foundation"]
         asked = [called[kind] if place and kind in paid else kind for kind in kinds]

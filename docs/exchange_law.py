@@ -20,7 +20,7 @@ import plotly.graph_objects as go
 from pictures import IMAGES, svg
 from scipy.stats import t as student
 
-from shipid import __version__, read_results
+from shipid import read_results
 from shipid.exchange.cells import read_cell_table
 from shipid.exchange.expect import study_cells
 from shipid.exchange.law import (
@@ -238,10 +238,8 @@ def main() -> None:
     cells = read_cell_table(given.cells)
     law = fit_law(cells)
     digest = hashlib.sha256(given.cells.read_bytes()).hexdigest()[:12]
-    provenance = {
-        "cells": len(cells), "ships": int(cells["ship"].nunique()), "digest": digest, "version": __version__,
-        "date": datetime.date.today().isoformat(), "command": f"python docs/exchange_law.py {given.cells.name} --write",
-    }  # fmt: skip
+    command = f"python docs/exchange_law.py {given.cells.name} --write"
+    provenance = {**law.provenance, "digest": digest, "date": datetime.date.today().isoformat(), "command": command}
     if given.write:
         save_law(replace(law, provenance=provenance), LAW_FILE)
         return

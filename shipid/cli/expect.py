@@ -58,7 +58,7 @@ def expect_command(
         exchange, ahead = exchange.given(cells), float(cells["ahead"].iloc[0])
         most = int(cells["N_D"].max())
         amounts = amounts if runs else [most, 2 * most, 4 * most]
-        foundations = list(dict.fromkeys(cells["foundation"]))
+        foundations = [*dict.fromkeys(cells["foundation"]), *(expect.likely_physics(kind, a) if kind or a else [])]
     else:
         foundations = expect.likely_physics(kind, a)
         if vessel is not None:

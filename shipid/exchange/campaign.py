@@ -31,7 +31,7 @@ from shipid.study.workers import on_workers
 from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
-from shipid.vessel.similar import particulars_distance
+from shipid.vessel.similar import particulars_distance, vessel_particulars
 from shipid.vessel.template import Particulars, first_guess
 
 BUNDLED = {
@@ -96,16 +96,15 @@ def studied_ship(name: str, seed: int, drawn: int) -> StudiedShip:
 
 
 def _known_particulars(vessel: Vessel) -> Particulars | None:
-    """Particulars of a bundled vessel as its document gives them; None where beam or draught are missing."""
-    known, controls = vessel.document["particulars"], Controls(vessel)
-    if not {"L_pp", "B", "T"} <= set(known):
+    """Particulars of a bundled vessel; None where beam or draught are missing."""
+    known, controls, U = vessel_particulars(vessel), Controls(vessel), vessel_service_speed(vessel)
+    if not {"L_pp", "B", "T", "C_b"} <= known.keys():
         return None
-    L, B, T, U = *(float(known[name]) for name in ("L_pp", "B", "T")), vessel_service_speed(vessel)
-    block = known.get("C_b") or vessel.parameters["inertia.m"] / (vessel.document["constants"]["rho"] * L * B * T)
     signals = {name.rpartition(".")[2] for name in controls.commands}
     propulsor = "azimuth" if "alpha" in signals else "propeller-rudder" if "delta" in signals else "differential"
     n = balanced_shaft(controls, U)
     rpm = None if n is None else 60 * n
+    L, B, T, block = (known[name] for name in ("L_pp", "B", "T", "C_b"))
     return Particulars(L, B, T, block, U, propulsor, rpm=rpm, shafts=len(controls.drives))
 
 
@@ -115,8 +114,11 @@ def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
     if mine is None or mine.rpm is None:
         return None
     kind = mine.propulsor, mine.units
-    others = [one for one in drawn_ships(seed, drawn) if one.name != ship.name]
-    near = [one for one in others if (one.particulars.propulsor, one.particulars.units) == kind]
+    near = [
+        one
+        for one in drawn_ships(seed, drawn)
+        if one.name != ship.name and (one.particulars.propulsor, one.particulars.units) == kind
+    ]
     near.sort(key=lambda one: particulars_distance(_known_numbers(mine), _known_numbers(one.particulars)))
     return near[0].vessel(like=mine) if near else None
 
@@ -148,9 +150,11 @@ def _families(
     last = {path: path.rpartition(".")[2] for path in paths}
     drives = [path for path in paths if path.startswith("thruster.") and (last[path] in DRIVING or ".K_T." in path)]
     steers = [
-        path for path in paths if last[path] in STEERING or (path.startswith("thruster.") and "delta" in last[path])
+        path
+        for path in paths
+        if (last[path] in STEERING or (path.startswith("thruster.") and "delta" in last[path]))
+        and ".actuator." not in path
     ]
-    steers = [path for path in steers if ".actuator." not in path]
     thrust = [
         {"parameters": group, "factor": ends, "together": True}
         for group, ends in ((drives, [0.4, 1.6]), (steers, [0.6, 1.4]))

@@ -237,8 +237,6 @@ def study_ways(results: Results) -> Ways:
     assert cost is not None
     own, ship = study_cells(results)
     ends = results.judged_cells.query("status == 'ok'")
-    if own.empty:
-        raise ShipidError("no cell has a result", file=results.folder)
     have = results.pool if results.plan.study.data is not None else 0
     amounts = [have, *(amount for amount in AMOUNTS if amount > have)]
     names = [NO_MODEL, *cost.foundations]

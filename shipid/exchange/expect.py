@@ -59,7 +59,7 @@ def study_cells(results: Results) -> tuple[pd.DataFrame, UnseenShip]:
     """Cells of a finished study as those of the law, the mean over seeds, and its ship.
 
     The kind of a foundation is the name of its family where that is one of `CELL_KINDS`, else unknown; the floor is A
-    of a family `nominal`. Raises ShipidError for a study without a vessel of known length.
+    of a family `nominal`. Raises ShipidError for a study without a vessel of known length or without results.
     """
     vessels = [one for one in results.plan.vessels.values() if one.length]
     if not vessels:
@@ -67,6 +67,8 @@ def study_cells(results: Results) -> tuple[pd.DataFrame, UnseenShip]:
     length, speed = float(vessels[0].length or np.nan), vessel_service_speed(vessels[0])
     cells = results.judged_cells
     cells = cells[cells["status"] == "ok"].groupby(["foundation", "family", "N_D"], as_index=False)[["A", "H"]].mean()
+    if cells.empty:
+        raise ShipidError("no cell has a result: run the study first", file=results.folder)
     baseline = float(error_of_windows(results.naive).mean())
     ship = UnseenShip(length, speed, baseline)
     nominal = cells["A"][cells["family"] == "nominal"]

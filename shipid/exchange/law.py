@@ -23,6 +23,7 @@ from shipid.errors import ResultError, ShipidError
 from shipid.exchange.cells import CELL_KINDS, check_cells
 from shipid.files import read_json, write_json
 from shipid.units import GRAVITY
+from shipid.version import __version__
 
 Array = np.ndarray
 Physics = str | float | tuple[str, float]
@@ -452,12 +453,8 @@ class ExchangeLaw:
         if self.own is None:
             return None
         own = self.own.assign(ship=ASKED)
-        unknown = own["floor"].isna()
-        if unknown.any():
-            mean = self.parts["floor"].mean(own.assign(floor=own["baseline"]))[0]
-            least = own.groupby("ahead")["A"].transform("min")
-            own["floor"] = own["floor"].fillna(np.fmin(own["baseline"] * np.exp(mean), least))
-        return own
+        mean, least = self.parts["floor"].mean(own)[0], own.groupby("ahead")["A"].transform("min")
+        return own.assign(floor=own["floor"].fillna(np.fmin(own["baseline"] * np.exp(mean), least)))
 
 
 def _cells_to_draw(
@@ -494,21 +491,26 @@ def fit_law(cells: pd.DataFrame) -> ExchangeLaw:
     }
     sizes = cells.assign(A=cells["A"] / cells["length"])
     limits = {name: (float(sizes[name].min()), float(sizes[name].max())) for name in LIMITED}
-    return ExchangeLaw(parts, limits)
+    taught = {"cells": len(cells), "ships": int(cells["ship"].nunique()), "version": __version__}
+    return ExchangeLaw(parts, limits, taught)
 
 
 def save_law(law: ExchangeLaw, file: Path) -> None:
     """Write a law as JSON: of each response theta, covariance, variances and ships, then limits and provenance."""
     parts = {
-        name: {
-            "features": list(part.response.features),
-            "levels": [" : ".join(level) for level in part.response.levels],
-        }
-        | {key: getattr(part, key) for key in ("theta", "covariance", "variances")}
-        | {"ships": part.ships}
+        name: _response_names(part.response)
+        | {key: getattr(part, key) for key in ("theta", "covariance", "variances", "ships")}
         for name, part in law.parts.items()
     }
     write_json(file, {"parts": parts, "limits": law.limits, "provenance": law.provenance})
+
+
+def _response_names(response: Response) -> dict[str, list[str]]:
+    """What the numbers of a law belong to: features, then those of the floor, and levels."""
+    return {
+        "features": [*response.features, *response.floor],
+        "levels": [" : ".join(level) for level in response.levels],
+    }
 
 
 def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
@@ -520,11 +522,11 @@ def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
     try:
         for name, response in RESPONSES.items():
             part = content["parts"][name]
-            if part["features"] != list(response.features):
+            if not _response_names(response).items() <= part.items():
                 raise ResultError("has other features than this version of shipid: fit it anew", file=file, path=name)
             theta, covariance, variances = (np.array(part[key], float) for key in ("theta", "covariance", "variances"))
             parts[name] = Hierarchy(response, theta, covariance, variances, part["ships"])
-        limits = {name: (float(low), float(high)) for name, (low, high) in content["limits"].items()}
+        limits = {name: (float(low), float(high)) for name in LIMITED for low, high in [content["limits"][name]]}
         return ExchangeLaw(parts, limits, content["provenance"])
     except (KeyError, TypeError, ValueError) as error:
         raise ResultError(f"is no law of exchange ({error!r})", file=file) from None

@@ -23,6 +23,7 @@ from shipid.units import DEGREE, GRAVITY
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.perturb import uniform_draw
 from shipid.vessel.regressions import ittc_friction
+from shipid.vessel.similar import TAYLOR
 from shipid.vessel.stability import yaw_growth
 from shipid.vessel.template import NU, RHO_AIR, RHO_SEA, Particulars
 
@@ -214,7 +215,7 @@ def _document(given: Particulars, dice: Dice, shaft: float) -> dict[str, Any]:
         "X_vv": -dice("X_vv", 0.0, 0.05) * T / L,
         "X_rr": -dice("X_rr", 0.0, 0.01) * T / L,
     }
-    wetted = 2.6 * math.sqrt(given.volume * L)  # Taylor
+    wetted = TAYLOR * math.sqrt(given.volume * L)
     friction = ittc_friction(U, L, NU) + dice("C_A", 0.0, 5e-4) * (L > 10)
     residuary = dice("C_R", 0.5, 1.8) * 1e-3  # Guldhammer and Harvald (1974): of ordinary forms at a service speed
     return {

@@ -27,9 +27,9 @@ def test_programs_get_rows_and_provenance():
 
 
 def test_a_study_is_foretold_at_more_runs(tiny_run: Path):
-    answer = json.loads(ended("expect", "--study", tiny_run, "--json")[1])
+    answer = json.loads(ended("expect", "--study", tiny_run, "--json", "--kind", "template")[1])
     assert answer["warnings"][0].startswith("extrapolated: ship lengths ahead 0.437, ")
-    assert {row["physics"] for row in answer["expected"]} == {"right", "wrong-1", "wrong-2", "none"}
+    assert {row["physics"] for row in answer["expected"]} == {"right", "wrong-1", "wrong-2", "none", "template"}
     runs = sorted({row["N_D"] for row in answer["expected"]})
     assert runs == [runs[0], 2 * runs[0], 4 * runs[0]]
 

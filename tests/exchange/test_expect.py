@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,12 @@ def test_a_study_conditions_the_law(law, tiny_run: Path):
     for row in known.to_dict("records"):
         assert row["low"] <= mine.loc[row["physics"], row["N_D"]] <= row["high"]
         assert (row["low"] < row["high"]) == (row["N_D"] > 0)
+
+
+def test_a_study_without_results_is_one_line(tiny_run: Path):
+    results = read_results(tiny_run)
+    with pytest.raises(ShipidError, match="no cell has a result: run the study first"):
+        expect.study_cells(replace(results, cells=results.cells.assign(status="failed")))
 
 
 def test_a_vessel_is_met_in_simulation(tmp_path: Path):

@@ -161,8 +161,10 @@ def test_a_law_is_written_and_read(law, tmp_path):
     one, two = (each.expect(asked, "template", [0, 4], 2.0, 100) for each in (law, other))
     assert np.quantile(two, [0.1, 0.5, 0.9]) == pytest.approx(np.quantile(one, [0.1, 0.5, 0.9]), rel=1e-3)
     assert other.limits == law.limits
+    assert other.provenance["ships"] == 16
     text = (tmp_path / "law.json").read_text()
-    for words in ("{}", "[1]", text.replace('"a:n"', '"a:p"'), text.replace('"limits"', '"limit"')):
+    changes = ('"a:n"', '"a:p"'), ('"none:few"', '"p:few"'), ('"ship : h"', '"ship : n"'), ('"A": [', '"B": [')
+    for words in ("{}", "[1]", *(text.replace(*one) for one in (*changes, ('"limits"', '"limit"')))):
         (tmp_path / "law.json").write_text(words)
         with pytest.raises(ResultError, match=r"law\.json: "):
             read_law(tmp_path / "law.json")
@@ -171,3 +173,21 @@ def test_a_law_is_written_and_read(law, tmp_path):
 def test_a_foundation_that_is_no_kind_is_refused(law):
     with pytest.raises(ShipidError, match="'guess' is no kind: give one of model-test"):
         law.expect(UnseenShip(100.0, 7.0), "guess", [1], 2.0, 10)
+
+
+@pytest.mark.parametrize(("kind", "part"), [("model-test", 9), ("identified", 25)])
+def test_tank_tests_have_a_third_and_identification_a_fifth_of_what_moderate_adds_to_the_floor(law, kind, part):
+    """In squares, as errors of different causes add."""
+    asked = UnseenShip(100.0, 7.0, baseline=50.0, floor=2.0)
+    better, moderate = (law.expect(asked, one, [0], 2.0, 50) for one in (kind, "moderate"))
+    assert better**2 - 2.0**2 == pytest.approx((moderate**2 - 2.0**2) / part)
+
+
+def test_a_floor_that_is_not_known_is_what_the_law_expects(law, cells):
+    """Within what floors of ships scatter about it, and at most the least A."""
+    ratios = []
+    for _, ship in cells[(cells["kind"] != "nominal") & (cells["ahead"] == 2.0)].groupby("ship"):
+        found = law.given(ship.assign(floor=np.nan))._own_rows()["floor"]
+        assert found.max() <= ship["A"].min()
+        ratios.append(np.log(found.iloc[0] / ship["floor"].iloc[0]))
+    assert np.abs(ratios).mean() < 0.7
