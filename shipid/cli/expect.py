@@ -45,12 +45,12 @@ def expect_command(
     for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
         if number is not None and not 0 < number < 1e6:
             raise ShipidError(f"{number:g}: must be above 0", path=option)
-    given = {"--kind": kind, "--A": a, "--length": length, "--speed": speed, "--vessel": vessel}
-    idle = list(given) if study else ["--length", "--speed"] if vessel else []
-    for option in idle:
-        if given[option] is not None:
-            kept = "--study has its own ship and physics" if study else "--vessel has its own"
-            raise ShipidError(f"{kept}: leave one of the two out", path=option)
+    idle = {"--length": length, "--speed": speed, "--vessel": vessel if study else None}
+    for option, value in idle.items():
+        if value is not None and (study or vessel):
+            raise ShipidError(
+                f"--{'study' if study else 'vessel'} has its own ship: leave one of the two out", path=option
+            )
     if study is not None:
         import shipid
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -23,6 +24,12 @@ class Normaliser(StoredData):
     names: tuple[str, ...]
     mean: Array
     std: Array
+
+    @classmethod
+    def fit(cls, table: Mapping[str, Array], names: Sequence[str]) -> Self:
+        """Take the statistics of training samples (S,)."""
+        values = [table[name] for name in names]
+        return cls(tuple(names), np.array([v.mean() for v in values]), np.array([v.std() for v in values]))
 
     def apply(self, table: Mapping[str, Array]) -> Array:
         """Return normalised inputs (S, d) of features (S,); DataError where one is missing."""

@@ -163,7 +163,7 @@ def test_a_family_of_two_minds_is_refused(tmp_path: Path, families: str, words: 
 def test_only_vessels_are_drawn_by_the_command_for_families(tmp_path: Path) -> None:
     status, _, said = ended("family", "show", study_file(tmp_path, TABLE))
     assert status
-    assert "its members are no vessels: only a family with a base is drawn here" in said
+    assert "its members are no variants of one vessel: only a family with a base alone is drawn here" in said
 
 
 def test_instants_of_nobody_knows_which_run_are_refused(tmp_path: Path, made: pd.DataFrame, cut: StudyWindows) -> None:
