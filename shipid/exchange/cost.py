@@ -190,7 +190,7 @@ class Ways:
             gain = f"a chance of {percent_text(self.reach[f, k + 1])}" if goal else f"{self.money(change)} more in all"
             lines.append(f"{more}, for an error of {metres_text(np.median(self.error[:, f, k + 1]))}: {gain}.")
         others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
-        lines += [f"With other physics: {'; '.join(others)}."] if others else []
+        lines += [f"Not as good, with other physics: {'; '.join(others)}."] if others else []
         amount, bought = self.next_step()
         step = "stop here" if bought is None else f"buy {model_text(self.foundations[bought])}"
         step = step if amount is None else f"go on to {counted_text(amount, 'run')} and look again"
