@@ -12,6 +12,7 @@ from shipid.cli.answer import Json, open_answer
 from shipid.errors import ShipidError
 
 HEADS = {"physics": "physics", "N_D": "runs", "H": "H [m]", "low": "95 % from", "high": "to"}
+OVER_FIRST = {"ratio": "over the first row", "ratio_low": "95 % from ", "ratio_high": "to "}
 
 
 def expect_command(
@@ -70,8 +71,11 @@ def expect_command(
             ship = UnseenShip(length, speed, sea=sea)
     table = expect.expected_errors(exchange, ship, foundations, amounts, ahead)
     with open_answer(as_json) as answer:
-        sentence = expect.expectation_sentence(table.iloc[0 if runs else len(amounts) // 2], ship, ahead)
+        sentence = expect.expectation_sentence(table.iloc[0], ship, ahead)
         answer.say(sentence, sentence=sentence)
+        if len(table) > 1:
+            comparison = expect.comparison_sentence(table)
+            answer.say(comparison, comparison=comparison)
         answer.warn(expect.sentences_on_limits(exchange, ship, foundations, amounts, ahead))
-        answer.records("expected", table, HEADS)
+        answer.records("expected", table, HEADS | OVER_FIRST)
         answer.say(expect.LIMITS.format(**exchange.provenance), law=exchange.provenance)

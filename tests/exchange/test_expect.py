@@ -31,6 +31,12 @@ def test_better_physics_and_more_runs_are_expected_to_err_less(law):
     assert (table["low"] < table["H"]).all()
     assert (table["H"] < table["high"]).all()
     assert (H[0] > SHIP.floor).all()
+    assert (table.loc[0, ["ratio", "ratio_low", "ratio_high"]] == 1.0).all()
+    other = table.loc[table["physics"] == "identified"].iloc[-1]
+    assert other["ratio"] == pytest.approx(other["H"] / table["H"][0], rel=0.1)
+    assert other["ratio_high"] / other["ratio_low"] < (other["high"] / other["low"]) * (table["high"] / table["low"])[0]
+    words = expect.comparison_sentence(table)
+    assert words.startswith("On the same ship identified with 40 runs errs least of these, 0.")
 
 
 def test_the_sentence_says_runs_physics_interval_and_horizon(law):
