@@ -275,7 +275,7 @@ def shown(value: object) -> str:
         return ""
     if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value)):
         return "see there" if value else ""
-    return f"`{json.dumps(value)}`"
+    return f"`{json.dumps(value, default=str)}`"
 
 
 def takes(schema: Schema, defs: Schema) -> str:

@@ -130,7 +130,7 @@ def expectation_sentence(row: pd.Series[Any], ship: UnseenShip, ahead: float) ->
 
 def comparison_sentence(table: pd.DataFrame) -> str:
     """Which row of `expected_errors` errs least on the same ship, against the first row."""
-    best = table.loc[table["ratio"].idxmin()]
+    best = table.iloc[int(table["ratio"].argmin())]
     low, middle, high = (significant_digits(float(best[name]), 2) for name in ("ratio_low", "ratio", "ratio_high"))
     way = f"{best['physics']} with {best['N_D']} {plural_word(best['N_D'], 'run')}"
     return f"On the same ship {way} errs least of these, {middle} times as much, 95 % interval {low} to {high}."
