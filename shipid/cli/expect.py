@@ -29,7 +29,9 @@ def expect_command(
         float | None, typer.Option("--A", help="m, mean error of the physics alone, of one --kind or any")
     ] = None,
     runs: Annotated[list[int] | None, typer.Option(min=0, help="that train; may be repeated")] = None,
-    ahead: Annotated[float, typer.Option(min=0.01, help="ship lengths at 0.75 of the service speed")] = 2.0,
+    ahead: Annotated[
+        float | None, typer.Option(min=0.01, help="ship lengths at 0.75 of the service speed; default: 2")
+    ] = None,
     sea: Annotated[str, typer.Option(help="calm, ordinary or rough: a third of the ships; default: all")] = "",
     law: Annotated[Path | None, typer.Option(help="another law.json")] = None,
     as_json: Json = False,
@@ -46,12 +48,13 @@ def expect_command(
     for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
         if number is not None and not 0 < number < 1e6:
             raise ShipidError(f"{number:g}: must be above 0", path=option)
-    idle = {"--length": length, "--speed": speed, "--vessel": vessel if study else None}
+    idle = {"--length": length, "--speed": speed} | ({"--vessel": vessel, "--ahead": ahead} if study else {})
     for option, value in idle.items():
         if value is not None and (study or vessel):
             raise ShipidError(
-                f"--{'study' if study else 'vessel'} has its own ship: leave one of the two out", path=option
+                f"--{'study' if study else 'vessel'} has its own: leave one of the two out", path=option
             )
+    ahead = 2.0 if ahead is None else ahead
     if study is not None:
         import shipid
 

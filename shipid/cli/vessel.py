@@ -151,7 +151,7 @@ def vessel_similar(
     length: Annotated[float | None, typer.Option(min=0.01, help="m, between perpendiculars")] = None,
     beam: Annotated[float | None, typer.Option(min=0.01, help="m")] = None,
     draught: Annotated[float | None, typer.Option(min=0.01, help="m")] = None,
-    block: Annotated[float | None, typer.Option(min=0.01, help="block coefficient")] = None,
+    block: Annotated[float | None, typer.Option(min=0.01, max=1.0, help="block coefficient")] = None,
     speed: Annotated[float | None, typer.Option(min=0.01, help="m/s, in service")] = None,
     vessel: Annotated[
         str | None, typer.Option(help="your own, such as a first guess: its particulars, and commands to take")
@@ -191,6 +191,8 @@ def vessel_similar(
         for one in best:
             write_text(check_output(out / f"{one.key}.toml", endings=(".toml",)), tomlkit.dumps(one.document))
     with open_answer(as_json) as answer:
+        if (far := min((row["distance"] for row in rows), default=0.0)) > FAR:
+            answer.warn([f"no ship is near: the nearest is {far:.3g} of the usual spreads of ships away"])
         answer.records("ships", rows[:number])
         notes = [f"{one.name}: {one.document['source']}" for one in best]
         answer.say("\n".join(notes), notes=notes)

@@ -34,10 +34,15 @@ NUMBERS = ("length", "speed", "froude", "N_D", "ahead", "H", "baseline", "floor"
 def read_cell_table(file: Path) -> pd.DataFrame:
     """Read a table of cells, CSV or Parquet; rows without a finite H, whose prediction diverged, are left out.
 
-    Raises DataError for a column that is missing, a kind that the law does not know, and a number that is not above 0.
+    Raises DataError for what is no table, a column that is missing, a kind that the law does not know, and a number that is not above 0.
     """
     with open_file(file) as source:
-        frame = pd.read_csv(source) if file.suffix == ".csv" else pd.read_parquet(source)
+        try:
+            frame = pd.read_csv(source) if file.suffix == ".csv" else pd.read_parquet(source)
+            frame = frame.astype({name: float for name in (*NUMBERS, "A") if name in frame})
+        except ValueError as error:
+            reason = str(error).partition("\n")[0]
+            raise DataError(f"is no table of cells, CSV or Parquet ({reason})", file=file) from error
     return check_cells(frame, file)
 
 

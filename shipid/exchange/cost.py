@@ -229,9 +229,9 @@ def errors_in_use(error: Array) -> Array:
 def study_ways(results: Results) -> Ways:
     """Ways to the goal of a study that has `[cost]`, by the law given the cells of the study.
 
-    Recorded runs that may train are there already. A name of `[cost.foundations]` is a family, of which each draw is
-    one member, or a kind of physics that has not been tried. Raises ShipidError where no vessel has a length, or no
-    cell a result.
+    Recorded runs that may train are there already. The runs that test are drawn again, alike for all ways (bootstrap).
+    A name of `[cost.foundations]` is a family, of which each draw is one member, or a kind of physics that has not been
+    tried. Raises ShipidError where no vessel has a length, or no cell a result.
     """
     cost = results.plan.study.cost
     assert cost is not None
@@ -246,9 +246,17 @@ def study_ways(results: Results) -> Ways:
     first = np.cumsum([0, *map(len, members[:-1])])
     taken = first + np.random.default_rng(0).integers([len(several) for several in members], size=(DRAWS, len(names)))
     error = errors_in_use(drawn[np.arange(DRAWS)[:, None], taken])[:, :, -len(amounts) :]
-    error = error * float((ends["H_end"] / ends["H"]).median())
+    error = error * float((ends["H_end"] / ends["H"]).median()) * _other_tests(results)[:, None, None]
     prices = np.array([0.0, *cost.foundations.values()])
     return Ways(cost, names, np.array(amounts, dtype=float), error, prices)
+
+
+def _other_tests(results: Results) -> Array:
+    """(DRAWS,) how many times as hard as this one other tests are: by constant u, v, r on its runs, drawn again."""
+    _, run = np.unique(results.test.run, return_inverse=True)
+    hard = np.bincount(run, results.naive.mean(axis=0)) / np.bincount(run)
+    again = np.random.default_rng(1).integers(len(hard), size=(DRAWS, len(hard)))
+    return np.asarray(hard[again].mean(axis=1) / hard.mean())
 
 
 def cost_frame(results: Results) -> pd.DataFrame:

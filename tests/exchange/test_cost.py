@@ -150,6 +150,8 @@ def test_the_ways_of_a_study_agree_with_its_cells(tiny_run: Path) -> None:
         place = list(ways.amounts).index(amount)
         low, high = np.quantile(ways.error[:, 0, place], [0.025, 0.975])
         assert low < min(H, results.naive.mean()) * factor <= high * 1.0001
+    alone = np.log(ways.error[:, 0, 0])
+    assert 0.01 < alone.std() < 1.0, "constant u, v, r on other tests: it was known to the digit"
     widths = np.log(ways.error[:, 1:, 4]).std(axis=0)
     assert widths[1] > widths[0], "physics that was not tried is less known"
 
