@@ -34,7 +34,8 @@ NUMBERS = ("length", "speed", "froude", "N_D", "ahead", "H", "baseline", "floor"
 def read_cell_table(file: Path) -> pd.DataFrame:
     """Read a table of cells, CSV or Parquet; rows without a finite H, whose prediction diverged, are left out.
 
-    Raises DataError for what is no table, a column that is missing, a kind that the law does not know, and a number that is not above 0.
+    Raises DataError for what is no table, a column that is missing, a kind that the law does not know, and a number
+    that is not above 0.
     """
     with open_file(file) as source:
         try:

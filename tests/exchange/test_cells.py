@@ -48,3 +48,13 @@ def test_a_missing_column_is_named(cells, tmp_path):
     cells.drop(columns="floor").to_csv(tmp_path / "cells.csv", index=False)
     with pytest.raises(DataError, match="floor: missing: a table of cells has the columns ship, type"):
         read_cell_table(tmp_path / "cells.csv")
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1 and no more", b"ship,H\nmariner,wide\n", b"\xff\xfe\x00"])
+@pytest.mark.parametrize("name", ["cells.csv", "cells.parquet"])
+def test_what_is_no_table_is_one_line(content, name, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError) as error:
+        read_cell_table(tmp_path / name)
+    assert str(tmp_path / name) in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
