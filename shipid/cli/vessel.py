@@ -178,6 +178,9 @@ def vessel_similar(
     if lacking := "length" if "L_pp" not in known else "vessel" if data is not None and own is None else None:
         remedy = {"length": "or a --vessel with particulars.L_pp", "vessel": "whose screws and helms the log drives"}
         raise ShipidError(f"missing: give it, {remedy[lacking]}", path=f"--{lacking}")
+    for option, width in (("--beam", beam), ("--draught", draught)):
+        if width is not None and width >= known["L_pp"]:
+            raise ShipidError(f"{width:g} m: must be below the length, {known['L_pp']:g} m", path=option)
     rows: list[dict[str, Any]] = [
         {"ship": one.key, "distance": distance, "vessel": one}
         for distance, one in similar_vessels(known, read_ships(ships), own)
@@ -191,8 +194,6 @@ def vessel_similar(
         for one in best:
             write_text(check_output(out / f"{one.key}.toml", endings=(".toml",)), tomlkit.dumps(one.document))
     with open_answer(as_json) as answer:
-        if (far := min((row["distance"] for row in rows), default=0.0)) > FAR:
-            answer.warn([f"no ship is near: the nearest is {far:.3g} of the usual spreads of ships away"])
         answer.records("ships", rows[:number])
         notes = [f"{one.name}: {one.document['source']}" for one in best]
         answer.say("\n".join(notes), notes=notes)
