@@ -51,9 +51,7 @@ def expect_command(
     idle = {"--length": length, "--speed": speed} | ({"--vessel": vessel, "--ahead": ahead} if study else {})
     for option, value in idle.items():
         if value is not None and (study or vessel):
-            raise ShipidError(
-                f"--{'study' if study else 'vessel'} has its own: leave one of the two out", path=option
-            )
+            raise ShipidError(f"--{'study' if study else 'vessel'} has its own: leave one of the two out", path=option)
     ahead = 2.0 if ahead is None else ahead
     if study is not None:
         import shipid

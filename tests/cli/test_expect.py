@@ -53,6 +53,8 @@ def test_a_study_is_foretold_at_more_runs(tiny_run: Path):
         ("--length 120 --speed 7 --A 4 --kind template --kind none", "--A: A is that of one kind"),
         ("--length 120 --speed 7 --law no.json", "no.json: cannot be read"),
         ("--vessel no-ship", "no-ship"),
+        ("--vessel otter --length 3", "--length: --vessel has its own: leave one of the two out"),
+        ("--study no-run --ahead 3", "--ahead: --study has its own: leave one of the two out"),
     ],
 )
 def test_a_wrong_argument_is_one_line(arguments: str, words: str):
