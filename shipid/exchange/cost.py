@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,7 @@ from shipid.errors import ShipidError
 from shipid.exchange.expect import study_cells
 from shipid.exchange.law import read_law
 from shipid.report.content import model_text
-from shipid.report.wording import CONSTANT_MOTION, counted_text, difference_text, metres_text
+from shipid.report.wording import CONSTANT_MOTION, counted_text, difference_text, metres_text, price_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.results import Results
 from shipid.study.schema import Cost
@@ -179,6 +179,7 @@ class Ways:
     def sentences(self) -> list[str]:
         """What to buy, what the next runs and other physics would change, and when to stop."""
         cost, (f, k) = self.cost, self.best()
+        money = partial(price_text, unit=cost.unit)
         goal, way = cost.H_end_required, self.way_text(f, k)
         aim = "The cheapest way in all" if goal is None else f"The cheapest way to {metres_text(goal)} at the horizon"
         lines = [f"{aim}, of those tried, is {way}."]
@@ -186,8 +187,8 @@ class Ways:
             lines = [f"No way that was tried is likely to reach {metres_text(goal)}; the surest is {way}."]
         if k + 1 < len(self.amounts):
             count, change = int(self.amounts[k + 1] - self.amounts[k]), self.expected[f, k + 1] - self.expected[f, k]
-            more = f"{counted_text(count, 'further run')} would cost {self.money(self.runs[k + 1] - self.runs[k])}"
-            gain = f"a chance of {percent_text(self.reach[f, k + 1])}" if goal else f"{self.money(change)} more in all"
+            more = f"{counted_text(count, 'further run')} would cost {money(self.runs[k + 1] - self.runs[k])}"
+            gain = f"a chance of {percent_text(self.reach[f, k + 1])}" if goal else f"{money(change)} more in all"
             lines.append(f"{more}, for an error of {metres_text(np.median(self.error[:, f, k + 1]))}: {gain}.")
         others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
         lines += [f"Not as good, with other physics: {'; '.join(others)}."] if others else []
@@ -197,22 +198,18 @@ class Ways:
         if goal is None:
             least = metres_text(cost.run / (cost.per_metre or 1))
             return [*lines, f"Next: {step}. Stop when a further run lowers the error by less than {least}, its price."]
-        total = self.money(min(self.after_runs.min(initial=np.inf), self.after_buying.min()))
+        total = money(min(self.after_runs.min(initial=np.inf), self.after_buying.min()))
         return [*lines, f"To see the goal reached on runs: {step}, and stop as soon as it is. Expect to pay {total}."]
-
-    def money(self, amount: float) -> str:
-        """An amount with its unit."""
-        return f"{amount:,.0f} {self.cost.unit}" if abs(amount) >= 100 else f"{amount:.3g} {self.cost.unit}"
 
     def way_text(self, f: int, k: int) -> str:
         """A way, its price, its error, and its chance or its loss, in words."""
         low, middle, high = np.quantile(self.error[:, f, k], [0.025, 0.5, 0.975])
         text = f"{model_text(self.foundations[f])} with {counted_text(int(self.amounts[k]), 'run')} for "
         text = f"{CONSTANT_MOTION} for " if self.foundations[f] == NO_MODEL and self.amounts[k] == 0 else text
-        text += f"{self.money(self.price[f, k])}: {difference_text(middle, low, high)}"
+        text += f"{price_text(self.price[f, k], self.cost.unit)}: {difference_text(middle, low, high)}"
         if self.cost.per_metre is None:
             return f"{text}, a chance of {percent_text(self.reach[f, k])}"
-        return f"{text}, {self.money(self.expected[f, k])} with what the error costs"
+        return f"{text}, {price_text(self.expected[f, k], self.cost.unit)} with what the error costs"
 
 
 def errors_in_use(error: Array) -> Array:

@@ -24,7 +24,7 @@ from shipid.report.figure import (
 )
 from shipid.report.page import Section
 from shipid.report.tables import PageTable, frame_table
-from shipid.report.wording import counted_text, difference_text, metres_text
+from shipid.report.wording import counted_text, difference_text, metres_text, price_text
 from shipid.units import percent_text
 
 WAY_COLUMNS = {
@@ -42,7 +42,7 @@ WAY_COLUMNS = {
 def frontier_figure(content: ReportContent) -> PageFigure:
     """Expected error at the horizon over the price, a line per physics, and the frontier."""
     ways = content.frame("cost")
-    best = ways[ways["frontier"]]
+    best, unit = ways[ways["frontier"]], ways["unit"].iloc[0]
     goal = "" if ways["goal"].isna().all() else " The dashed line is the goal."
     chips = [
         Chip(f"way:{name}", model_text(name), category_colour(i)) for i, name in enumerate(names_in(ways, "foundation"))
@@ -50,8 +50,8 @@ def frontier_figure(content: ReportContent) -> PageFigure:
     return PageFigure(
         id="frontier",
         title="What to buy: error over price",
-        takeaway=f"From {metres_text(best['H_end'].max())} for {_price_text(best, best['price'].min())} to "
-        f"{metres_text(best['H_end'].min())} for {_price_text(best, best['price'].max())}.",
+        takeaway=f"From {metres_text(best['H_end'].max())} for {price_text(best['price'].min(), unit)} to "
+        f"{metres_text(best['H_end'].min())} for {price_text(best['price'].max(), unit)}.",
         how="Each point is a number of runs with one physics: its price, and the median of the error at the horizon as "
         "the law of exchange expects it, given the cells of this study. The law was learned from simulated ships. "
         "Points with a ring are on the frontier: no cheaper way has a lower error." + goal,
@@ -67,7 +67,7 @@ def _draw_frontier(ways: pd.DataFrame) -> Panel:
     for i, name in enumerate(names_in(ways, "foundation")):
         mine, colour = ways[ways["foundation"] == name], category_colour(i % len(OKABE_ITO))
         words = [
-            f"{escape_name(model_text(name))}, {counted_text(row.N_D, 'run')}: {_price_text(ways, row.price)}<br>"
+            f"{escape_name(model_text(name))}, {counted_text(row.N_D, 'run')}: {price_text(row.price, row.unit)}<br>"
             f"{difference_text(row.H_end, row.low, row.high)}"
             + (f"<br>chance {percent_text(row.probability)}" if np.isfinite(row.probability) else "")
             for row in rows_as_tuples(mine)
@@ -83,10 +83,6 @@ def _draw_frontier(ways: pd.DataFrame) -> Panel:
     return make_plot(traces, x, log_axis("error at the horizon [m]"))
 
 
-def _price_text(ways: pd.DataFrame, price: float) -> str:
-    return f"{price:,.4g} {ways['unit'].iloc[0]}"
-
-
 def ways_table(content: ReportContent) -> PageTable:
     """The best way with each physics."""
     ways = content.frame("cost")
@@ -94,11 +90,11 @@ def ways_table(content: ReportContent) -> PageTable:
     columns = {name: column for name, column in WAY_COLUMNS.items() if best[column].notna().any()}
     unit = ways["unit"].iloc[0]
     if best["goal"].isna().all():
-        takeaway = f"Prices are in {unit}; *price and error* adds what the expected error costs."
+        takeaway = f'Prices are in {unit}; "price and error" adds what the expected error costs.'
     else:
         columns = {"expect to pay" if name == "price and error" else name: one for name, one in columns.items()}
         takeaway = (
-            f"Prices are in {unit}; *chance* is that of the goal, *expect to pay* what is paid on average until runs "
+            f'Prices are in {unit}; "chance" is that of the goal, "expect to pay" what is paid on average until runs '
             "show that the goal is reached, with more runs or other physics where this way does not."
         )
     return frame_table("ways", "The best way with each physics", takeaway, best, columns)

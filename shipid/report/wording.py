@@ -90,6 +90,11 @@ def counted_text(count: int, noun: str) -> str:
     return f"{count:,} {plural_word(count, noun)}"
 
 
+def price_text(amount: float, unit: str) -> str:
+    """Write a price with its unit, such as `16,000 EUR` or `2.5 h`."""
+    return f"{amount:,.0f} {unit}" if abs(amount) >= 100 else f"{amount:.3g} {unit}"
+
+
 def duration_text(seconds: float) -> str:
     """Write a duration [s] as text in s, min or h."""
     if seconds >= 7200:

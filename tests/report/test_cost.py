@@ -50,6 +50,7 @@ def test_the_table_has_the_best_way_with_each_physics(simulation: ReportContent)
     runs = [row[table.columns.index("runs, N_D [1]")].text for row in table.rows]
     assert sorted(runs) == ["4", "8", "8"]
     assert "chance" in table.columns
+    assert "*" not in table.takeaway, "text of a page is no Markdown"
     assert "chance" not in cost.ways_table(priced(simulation, per_metre=30.0)).columns
 
 
