@@ -31,6 +31,7 @@ from shipid.exchange.law import (
     ExchangeLaw,
     Hierarchy,
     Response,
+    UnseenShip,
     feature_columns,
     fit_hierarchy,
     fit_law,
@@ -43,6 +44,7 @@ from shipid.exchange.law import (
 FORM = RESPONSES["H"]
 NEAREST = ("length", "froude")
 SEARCH_ROWS, GAUSSIAN_ROWS = 400, 1000  # of a Gaussian process: its price grows with the cube
+FORM_AHEAD = 2.0  # ship lengths
 FIRST = 3  # amounts that are given before the others are foretold
 
 
@@ -55,6 +57,23 @@ def interval_of(part: Hierarchy, rows: pd.DataFrame, known: pd.DataFrame | None 
         return mean, half * np.sqrt(np.diag(spread)), half * np.sqrt(spread.mean())
     low, middle, high = np.quantile(part.deviations(rows, 2000, rng, known), [0.025, 0.5, 0.975], axis=0)
     return mean + middle, (high - low) / 2, np.array(np.nan)
+
+
+def foretell_begun(law: ExchangeLaw, rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Error and half of the 95 % interval (cells,) of ln H at later amounts, the first and no floor given.
+
+    As of a study of a real ship, of which nobody knows the true physics; two ship lengths ahead.
+    """
+    rows = rows[(rows["ahead"] == FORM_AHEAD) & (rows["kind"] != "nominal")]
+    amounts = sorted(rows["N_D"].unique())
+    own, one = rows[rows["N_D"].isin(amounts[:FIRST])].assign(floor=np.nan), rows.iloc[0]
+    later = rows[rows["foundation"].isin(own["foundation"])].pivot(index="foundation", columns="N_D", values="H")
+    ship = UnseenShip(one["length"], one["speed"], one["baseline"])
+    draws = law.given(own).expect_all(ship, [*later.index], amounts[FIRST:], FORM_AHEAD, 2000)
+    low, middle, high = np.log(np.quantile(draws, [0.025, 0.5, 0.975], axis=0))
+    known = np.log(later[amounts[FIRST:]].to_numpy())
+    held = np.isfinite(known)
+    return (known - middle)[held], ((high - low) / 2)[held]
 
 
 def score(error: np.ndarray, inside: np.ndarray) -> list[str]:
@@ -100,9 +119,10 @@ def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
     return values[[int((((known - one) * weights) ** 2).sum(axis=1).argmin()) for one in asked]]
 
 
-def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
+def judge(cells: pd.DataFrame, law: ExchangeLaw) -> None:
     """Print how well ships and types that were left out are foretold, by the law and its rivals."""
-    linear, rows_of = (
+    part, linear, rows_of = (
+        law.parts["H"],
         FORM._replace(features=(*FORM.features, "p", "p:n", *NO_PHYSICS), floor=()),
         dict(tuple(response_rows(FORM, cells).groupby("ship", sort=False))),
     )
@@ -136,6 +156,8 @@ def judge(cells: pd.DataFrame, part: Hierarchy) -> None:
         first = rows["N_D"].isin(sorted(rows["N_D"].unique())[:FIRST])
         mean, half, _ = interval_of(one, rows[~first], rows[first])
         note("law, first three amounts given", value[~first] - mean, half)
+        begun = replace(law, parts={**law.parts, "H": one})
+        note("law, first three amounts given, floor not known", *foretell_begun(begun, rows))
     for _, group in cells.groupby("type"):
         absent = {*group["ship"]}
         one = fit_without(FORM, absent)
@@ -263,7 +285,7 @@ def main() -> None:
     if given.unseen:
         print_unseen(law, given.unseen)
     print(flush=True)
-    judge(cells, part)
+    judge(cells, law)
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from shipid.study.workers import on_workers
 from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
-from shipid.vessel.similar import particulars_distance, vessel_particulars
+from shipid.vessel.similar import similar_vessels, vessel_particulars
 from shipid.vessel.template import Particulars, first_guess
 
 BUNDLED = {
@@ -51,6 +51,8 @@ DRAWN = 30
 AMOUNTS, TESTS = (1, 2, 4, 8, 16, 32, 64), 12  # runs for training and for the test
 HORIZONS = (1.0, 2.0, 4.0)  # ship lengths at 0.75 of the service speed
 ZIGZAG = "zigzag"
+ROUGHNESS = {"weather": (0.03, 1.0), "noise": (0.03, 2.0)}
+"""Of what `study new` drafts, from next to nothing: a towing tank on a good day, and the open sea."""
 STEPS = 32  # of the horizon
 SAMPLES = 12  # instants of a run
 PARTED = 2.1  # windows between the first and the last instant of a run: a single one can be parted to validate
@@ -109,18 +111,16 @@ def _known_particulars(vessel: Vessel) -> Particulars | None:
 
 
 def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
-    """The nearest drawn ship with the same drive, scaled to the length of a ship; None where there is none."""
+    """The nearest drawn ship with the same drive, as `vessel similar` scales it; None where there is none."""
     mine = ship.particulars
-    if mine is None or mine.rpm is None:
+    if mine is None:
         return None
-    kind = mine.propulsor, mine.units
     near = [
-        one
+        one.vessel()
         for one in drawn_ships(seed, drawn)
-        if one.name != ship.name and (one.particulars.propulsor, one.particulars.units) == kind
+        if one.name != ship.name and (one.particulars.propulsor, one.particulars.units) == (mine.propulsor, mine.units)
     ]
-    near.sort(key=lambda one: particulars_distance(_known_numbers(mine), _known_numbers(one.particulars)))
-    return near[0].vessel(like=mine) if near else None
+    return next((vessel for _, vessel in similar_vessels(_known_numbers(mine), near, ship.physics)), None)
 
 
 def _known_numbers(given: Particulars) -> dict[str, float]:
@@ -211,10 +211,10 @@ def plan_ship(ship: StudiedShip, seed: int, drawn: int, amounts: Iterable[int] =
     }
     if ship.sea:
         truth["waves"] = dict(ship.sea)
+    weather, noise = (math.exp(dice(name, *map(math.log, ends))) for name, ends in ROUGHNESS.items())
     for name, most in (("current_speed", 1.0), ("wind_speed", 1.6)):
         if name in truth:
-            truth[name] = [0.0, truth[name][1] * dice(name, 0.1, most)]
-    noise = dice.scatter("noise", 1.5)
+            truth[name] = [0.0, truth[name][1] * weather * dice(name, 0.5, most)]
     truth["sensors"] = {name: {"noise": noise * one["noise"]} for name, one in truth["sensors"].items()}
     step = prediction["step"]
     steps = round(prediction["ahead"] / step)

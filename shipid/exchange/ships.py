@@ -106,20 +106,9 @@ class DrawnShip:
     particulars: Particulars
     dice: Dice
 
-    def vessel(self, like: Particulars | None = None) -> Vessel:
-        """The truth.
-
-        like : a ship of the same drive, to whose length this one is scaled by Froude's law, with its shaft speed.
-        """
-        given = self.particulars
-        if like is None:
-            return check_document(_document(given, self.dice, 1.0), f"{self.name}.toml")
-        ratio = like.length / given.length
-        speed = math.sqrt(ratio) * given.service
-        scaled = replace(given, length=like.length, beam=ratio * given.beam, draught=ratio * given.draught, speed=speed)
-        n = balanced_shaft(Controls(check_document(_document(scaled, self.dice, 1.0), self.name)), speed)
-        share = (like.rpm or 0.0) / 60 / (n or 1.0) * speed / like.service
-        return check_document(_document(scaled, self.dice, share), f"{self.name}.toml")
+    def vessel(self) -> Vessel:
+        """The truth."""
+        return check_document(_document(self.particulars, self.dice), f"{self.name}.toml")
 
 
 def draw_ship(seed: int, number: int) -> DrawnShip:
@@ -201,8 +190,8 @@ def _linear_derivatives(given: Particulars, dice: Dice) -> dict[str, float]:
     }
 
 
-def _document(given: Particulars, dice: Dice, shaft: float) -> dict[str, Any]:
-    """The document of a truth; shaft : factor of the shaft speed for the same thrust."""
+def _document(given: Particulars, dice: Dice) -> dict[str, Any]:
+    """The document of a truth."""
     L, B, T, U = given.length, given.beam, given.draught, given.service
     m = RHO_SEA * given.volume
     prime = RHO_SEA / 2 * L**3
@@ -238,7 +227,7 @@ def _document(given: Particulars, dice: Dice, shaft: float) -> dict[str, Any]:
             },
         },
         "wind": _wind(given, dice),
-        "thruster": dict(_thrusters(given, dice, shaft)),
+        "thruster": dict(_thrusters(given, dice)),
     }  # fmt: skip
 
 
@@ -260,33 +249,33 @@ def _wind(given: Particulars, dice: Dice) -> dict[str, Any]:
     }
 
 
-def _thrusters(given: Particulars, dice: Dice, shaft: float) -> Iterator[tuple[str, dict[str, Any]]]:
+def _thrusters(given: Particulars, dice: Dice) -> Iterator[tuple[str, dict[str, Any]]]:
     """Screws, rudders or azimuth units by the names that `vessel new` gives them."""
     y = dice("y", 0.17, 0.27) * given.beam
     sides = (("port", -y), ("starboard", y)) if given.units == 2 else (("", 0.0),)
     for side, place in sides:
         if given.propulsor == "azimuth":
-            yield side, _azimuth(given, dice, shaft, place)
+            yield side, _azimuth(given, dice, place)
             continue
         screw = side or "propeller"
-        yield screw, _screw(given, dice, shaft, place)
+        yield screw, _screw(given, dice, place)
         if given.propulsor == "propeller-rudder":
             yield (f"{side}_rudder" if side else "rudder"), {"behind": screw, **_rudder(given, dice, place)}
 
 
-def _screw(given: Particulars, dice: Dice, shaft: float, y: float) -> dict[str, Any]:
+def _screw(given: Particulars, dice: Dice, y: float) -> dict[str, Any]:
     """A screw with the bilinear thrust of Blanke (1981): K_T = k_0 - k_1 J."""
     D = dice("D_p", 0.5, 0.72 if given.units == 1 else 0.6) * given.draught
     wake = dice("w_P0", 0.4, 0.6) * given.block * (1.0 if given.units == 1 else 0.4)
     return {
         "kind": "quadratic", "x": -0.48 * given.length, "y": y, "z": 0.6 * given.draught, "D_p": D,
-        "T_nn": RHO_SEA * D**4 * dice("k_0", 0.32, 0.46) / shaft**2,
-        "T_nu": RHO_SEA * D**3 * dice("k_1", 0.32, 0.46) / shaft,
+        "T_nn": RHO_SEA * D**4 * dice("k_0", 0.32, 0.46),
+        "T_nu": RHO_SEA * D**3 * dice("k_1", 0.32, 0.46),
         "k_astern": dice("k_astern", 0.6, 0.9), "w_P0": wake, "t_P": dice("t_P", 0.5, 0.8) * wake,
     }  # fmt: skip
 
 
-def _azimuth(given: Particulars, dice: Dice, shaft: float, y: float) -> dict[str, Any]:
+def _azimuth(given: Particulars, dice: Dice, y: float) -> dict[str, Any]:
     """An azimuth unit: bilinear along, linear across; beyond the range of its polynomials as that of R/V Gunnerus."""
     unit = value_at_path(read_document(bundled_documents("models")["gunnerus-28.9"]), "thruster.port")
     D = dice("D_p", 0.5, 0.7) * given.draught
@@ -294,9 +283,9 @@ def _azimuth(given: Particulars, dice: Dice, shaft: float, y: float) -> dict[str
     return {
         **{name: one for name, one in unit.items() if name not in ("source", "actuator")},
         "x": -dice("x", 0.42, 0.48) * given.length, "y": y, "z": 0.7 * given.draught, "D_p": D,
-        "k_T": 1 / shaft**2,
-        "K_x": {"1": k_0, "J": -k_1 * shaft, "yy": dice("K_yy", 0.0, 0.3) * shaft**2},
-        "K_y": {"y": -dice("K_y", 0.5, 1.1) * shaft, "Jy": -dice("K_Jy", 0.2, 0.6) * shaft**2},
+        "k_T": 1.0,
+        "K_x": {"1": k_0, "J": -k_1, "yy": dice("K_yy", 0.0, 0.3)},
+        "K_y": {"y": -dice("K_y", 0.5, 1.1), "Jy": -dice("K_Jy", 0.2, 0.6)},
         "actuator": {"alpha": _gear(given, dice, (9.0, 15.0))},
     }  # fmt: skip
 

@@ -41,7 +41,7 @@ def test_the_study_of_a_ship_has_its_own_sizes(name: str) -> None:
     assert ahead.ahead * 0.75 * U / L == pytest.approx(max(HORIZONS), rel=0.05)
     assert ahead.horizon % 4 == 0
     assert truth.current_speed[1] <= 0.051 * U
-    assert 0.001 * U < truth.sensors["u"].noise < 0.0126 * U
+    assert 0.0001 * U < truth.sensors["u"].noise < 0.0101 * U
     assert {one.kind for one in truth.manoeuvre} >= {"turning", "steps"}
     assert {one.family.partition("-")[0] for one in plan.foundations} == {
         *("nominal", "damping", "mass", "thrust", "missing", "moderate", "high", "template", "none"),

@@ -81,15 +81,6 @@ def test_the_truth_is_not_what_the_template_gives(fleet: list[DrawnShip]) -> Non
         assert not hulls[0] & hulls[1]
 
 
-def test_a_sister_has_the_length_and_the_shaft_speed_of_the_ship(fleet: list[DrawnShip]) -> None:
-    one, other = fleet[0].particulars, fleet[2]
-    sister = other.vessel(like=one)
-    speed = other.particulars.service * np.sqrt(one.length / other.particulars.length)
-    n = balanced_shaft(Controls(sister), float(speed))
-    assert sister.length == one.length
-    assert 60 * float(n or 0) * one.service / speed == pytest.approx(one.rpm, rel=1e-3)
-
-
 def test_the_regressions_are_those_of_the_mariner_within_their_scatter() -> None:
     """Planar motion tests of Chislett and Stroem-Tejsen (1965): Y_v -1160e-5, N_v -264e-5, N_r -166e-5."""
     mariner = Particulars(160.93, 23.17, 7.47, 0.597)
