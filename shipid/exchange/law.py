@@ -11,14 +11,13 @@ foundation and of the runs drawn are Gaussian with variances that the cells tell
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.stats import multivariate_t
 
 from shipid.errors import ResultError, ShipidError
 from shipid.exchange.cells import CELL_KINDS, check_cells
@@ -97,7 +96,6 @@ ANY = "any"  # kind of a physics of which A is all that is known: each draw has 
 LIMITED = ("length", "froude", "N_D", "ahead", "A")
 CENTRE, FLOOR_CENTRE = {"1": -2.0, "a": 1.0, "n": -0.4}, {"1": -0.5, "p": 1.0}
 """Means of the priors of H that are not 0: a share of A, falling with runs, beside a share of the floor."""
-FLOORS_TRIED = 24  # where the floor of a ship with known cells is not known
 MOST_STEP = 0.5  # of theta in one round
 WIDE, NARROW = 3.0, 0.3  # standard deviations of the Gaussian priors of features, and of those of a kind
 
@@ -175,13 +173,6 @@ class Hierarchy:
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         scale = np.sqrt(freedom / rng.chisquare(freedom, draws))
         return np.asarray(centre + scale[:, None] * (rng.standard_normal((draws, len(cells))) @ root.T))
-
-    def log_likelihood(self, cells: pd.DataFrame) -> float:
-        """Student log density of the values of cells of one ship that had no part in the fit."""
-        rows = response_rows(self.response, cells)
-        mean, jacobian = self.mean(rows)
-        values = response_values(self.response, rows)
-        return float(multivariate_t.logpdf(values, mean, self.spread(rows, jacobian), self.freedom))
 
     @property
     def freedom(self) -> float:
@@ -414,11 +405,7 @@ class ExchangeLaw:
         Draws are Student's, with as many degrees of freedom as there are ships beyond the effects of each. Raises
         ShipidError for a foundation that is no kind.
         """
-        rng, own = np.random.default_rng(seed), None if self.own is None else self.own.assign(ship=ASKED)
-        if own is not None and own["floor"].isna().any():
-            laws = self._laws_by_floor(own, draws, rng)
-            parts = [law.expect_all(ship, foundations, amounts, ahead, *given) for law, *given in laws]
-            return np.asarray(rng.permutation(np.concatenate(parts)))
+        rng, own = np.random.default_rng(seed), self._own_rows()
         cells = _cells_to_draw(ship, foundations, ahead, own)
         many = cells.drop(columns=["ship", "foundation"]).loc[np.tile(cells.index, draws)].reset_index(drop=True)
         many["kind"] = pd.Categorical(many["kind"].where(many["kind"] != ANY, rng.choice(FLAWS, len(many))))
@@ -461,22 +448,13 @@ class ExchangeLaw:
             deviation = deviation[rng.permutation(third)]
         return np.asarray(np.exp(mean + deviation) * many[part.response.unit].to_numpy().reshape(draws, -1))
 
-    def _laws_by_floor(
-        self, own: pd.DataFrame, draws: int, rng: np.random.Generator
-    ) -> Iterator[tuple[ExchangeLaw, int, int]]:
-        """Laws of the own ship with a floor that is drawn, how many draws each takes, and their seed.
-
-        A floor takes draws in proportion to how well it explains the own cells: importance resampling.
-        """
-        horizons, part = own.drop_duplicates("ahead"), self.parts["floor"]
-        floors = np.exp(part.mean(horizons)[0] + part.deviations(horizons, FLOORS_TRIED, rng)) * [*horizons["baseline"]]
-        floors = np.fmin(floors, [own["A"][own["ahead"] == ahead].min() for ahead in horizons["ahead"]])
-        tables = [own.assign(floor=own["ahead"].map(dict(zip(horizons["ahead"], row, strict=True)))) for row in floors]
-        fit = np.array([self.parts["H"].log_likelihood(table) for table in tables])
-        counts = rng.multinomial(draws, np.exp(fit - fit.max()) / np.exp(fit - fit.max()).sum())
-        for seed, (table, count) in enumerate(zip(tables, counts, strict=True)):
-            if count:
-                yield replace(self, own=table), int(count), seed
+    def _own_rows(self) -> pd.DataFrame | None:
+        """Cells of the own ship with runs, their floor filled with what the law expects where it is not known."""
+        if self.own is None:
+            return None
+        own = self.own.assign(ship=ASKED)
+        mean, least = self.parts["floor"].mean(own)[0], own.groupby("ahead")["A"].transform("min")
+        return own.assign(floor=own["floor"].fillna(np.fmin(own["baseline"] * np.exp(mean), least)))
 
 
 def _cells_to_draw(
