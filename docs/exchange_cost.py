@@ -208,10 +208,8 @@ def advise_by(knowledge: Knowledge) -> Policy:
             draws[:, :, state.place :],
             prices,
         )
-        amount, bought = ways.next_step()
-        if bought is not None:
-            return -1, bought
-        return (state.place + 1, -1) if amount is not None else STOP
+        best = ways.next_step
+        return (-1, best) if isinstance(best, int) else (state.place + 1, -1) if best == "run" else STOP
 
     return step
 
