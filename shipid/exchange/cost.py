@@ -103,15 +103,15 @@ class Ways:
                 losses["stop"] = metre * least[bought][:, k]
             losses |= {g: self.prices[g] + later[one] for g, one in wider.items() if one in later}
             losses = losses or {"stop": np.full(len(self.error), self.prices[[*wider]].sum())}
+            still = ~(self.reaches(least[bought][:, k]) & (self.amounts[k] > 0))
             if not (bought or k):
                 break
-            still = ~(self.reaches(least[bought][:, k]) & (self.amounts[k] > 0))
             seen = [place for place in {(k + 1) // 2, k} if self.amounts[place] > 0]
             later[bought] = np.zeros(len(still))
             if still.any():
                 each = np.stack([*losses.values()], axis=1)[still]
                 later[bought][still] = take_best_steps(each, np.log(least[bought][still][:, seen]))
-        return {step: float(loss.mean()) for step, loss in losses.items()}
+        return {step: float((loss * still).mean()) for step, loss in losses.items()}
 
     @property
     def next_step(self) -> str | int:
@@ -165,22 +165,22 @@ class Ways:
             lines = [f"No way that was tried is likely to reach {metres_text(goal)}; the surest is {way}."]
         others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
         lines += [f"The best with other physics: {'; '.join(others)}."] if others else []
+        if goal is not None and self.price[f, k] == 0:
+            return [*lines, "Stop here: nothing has to be bought."]
         step, *rest = sorted(self.steps, key=lambda one: self.steps[one])
-        lines.append(f"Next: {self.step_text(step)}. Expect to pay {money(self.steps[step])} from here on, in all")
-        lines[-1] += ", with what the error costs" * (goal is None)
-        lines[-1] += "".join(f"; {money(self.steps[one])} if you {self.step_text(one)} now" for one in rest) + "."
-        if goal is not None:
-            return [
-                *lines,
-                f"Then look at the errors again, and stop as soon as runs show {metres_text(goal)} or less.",
-            ]
+        whole = "in all" if goal else "with what the error costs"
+        text = (
+            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} {whole}"
+        )
+        text += "".join(f"; {money(self.steps[one])} if you {self.step_text(one)}" for one in rest)
         least = metres_text(cost.run / (cost.per_metre or 1))
-        return [*lines, f"Stop when a further run lowers the error by less than {least}: it costs as much."]
+        end = f"Stop when a further run lowers the error by less than {least}: a run costs as much."
+        return [*lines, f"{text}.", end if goal is None else f"Stop as soon as runs show {metres_text(goal)} or less."]
 
     def step_text(self, step: str | int) -> str:
         """What to do, what it costs, and the error that is expected then, in words."""
         if step == "stop":
-            return f"stop, at an error of {metres_text(np.median(self.least()[:, 0]))}"
+            return f"stop (error {metres_text(np.median(self.least()[:, 0]))})"
         if step == "run":
             price, error = self.runs[1], self.least()[:, 1]
             text = f"go on from {int(self.amounts[0])} to {counted_text(int(self.amounts[1]), 'run')}"
@@ -268,6 +268,13 @@ def cost_frame(results: Results) -> pd.DataFrame:
 def cost_sentences(results: Results) -> list[str]:
     """What a study says on what to buy; nothing where it has no `[cost]`."""
     try:
-        return [] if results.plan.study.cost is None else study_ways(results).sentences()
+        study = results.plan.study
+        if study.cost is None:
+            return []
+        there = f"Its {counted_text(results.pool, 'run')} of training are paid: they count."
+        if study.data is None:
+            most = counted_text(int(results.judged_cells["N_D"].max()), "run")
+            there = f"This study simulated up to {most}; at sea none is there yet, so runs count from 0."
+        return [*study_ways(results).sentences(), there]
     except ShipidError as error:
         return [f"What to buy cannot be said: {error.message}."]
