@@ -148,30 +148,46 @@ class Hierarchy:
         parts = zip(self.variances, _kernels(self.response, cells, known), strict=True)
         return np.asarray(sum((one * kernel for one, kernel in parts), jacobian @ self.covariance @ jacobian.T))
 
+    def residuals(self, known: pd.DataFrame, floors: Array) -> Array:
+        """ln(value / unit) less `mean` (draws, rows) of known cells, if their floors are so many times as large."""
+        many = known.iloc[np.tile(np.arange(len(known)), len(floors))]
+        many = many.assign(floor=many["floor"] * np.repeat(floors, len(known)))
+        return (response_values(self.response, many) - self.mean(many)[0]).reshape(len(floors), -1)
+
+    def likelihood(self, own: pd.DataFrame, floors: Array) -> Array:
+        """Student log density (draws,), but for a constant, of known cells of a ship at each of these factors."""
+        known = response_rows(self.response, own)
+        apart = self.residuals(known, floors)
+        distance = (apart * np.linalg.solve(self.spread(known, self.mean(known)[1]), apart.T).T).sum(axis=1)
+        return np.asarray(-(self.freedom + len(known)) / 2 * np.log1p(distance / self.freedom))
+
     def deviations(
-        self, cells: pd.DataFrame, draws: int, rng: np.random.Generator, own: pd.DataFrame | None = None
+        self,
+        cells: pd.DataFrame,
+        draws: int,
+        rng: np.random.Generator,
+        own: pd.DataFrame | None = None,
+        floors: Array | float = 1.0,
     ) -> Array:
         """Student draws (draws, rows) of value less `mean` for cells of one ship, given those of its cells in `own`.
 
         Known cells move them and make them narrower; ones that are further off than expected make them wider. What is
         drawn has other runs and another test, so that a cell that is known does not come out as it was measured.
+        floors : factors, or (draws,), of the floor of the known cells.
         """
         known = cells.head(0) if own is None else response_rows(self.response, own)
         joined = pd.concat([known, cells], ignore_index=True)
-        mean, jacobian = self.mean(joined)
-        count, freedom = len(known), self.freedom
-        spread = self.spread(joined, jacobian, count)
-        centre = np.zeros(len(cells))
+        count, freedom, widen, centre = len(known), self.freedom, np.ones(1), np.zeros((1, len(cells)))
+        spread = self.spread(joined, self.mean(joined)[1], count)
         if count:
             gain = np.linalg.solve(spread[:count, :count], spread[:count, count:]).T
-            apart = response_values(self.response, known) - mean[:count]
-            distance = apart @ np.linalg.solve(spread[:count, :count], apart)
-            centre = gain @ apart
-            spread = spread[count:, count:] - gain @ spread[:count, count:]
-            spread, freedom = spread * (freedom + distance) / (freedom + count), freedom + count
+            apart = self.residuals(known, np.atleast_1d(floors))
+            distance = (apart * np.linalg.solve(spread[:count, :count], apart.T).T).sum(axis=1)
+            centre, widen = apart @ gain.T, (freedom + distance) / (freedom + count)
+            spread, freedom = spread[count:, count:] - gain @ spread[:count, count:], freedom + count
         values, vectors = np.linalg.eigh(spread)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        scale = np.sqrt(freedom / rng.chisquare(freedom, draws))
+        scale = np.sqrt(widen * freedom / rng.chisquare(freedom, draws))
         return np.asarray(centre + scale[:, None] * (rng.standard_normal((draws, len(cells))) @ root.T))
 
     @property
@@ -217,7 +233,7 @@ def response_rows(response: Response, cells: pd.DataFrame) -> pd.DataFrame:
     if response.value == "H":
         return cells[cells["N_D"] > 0]
     if response.value == "A":
-        return cells[cells["kind"] != "none"].drop_duplicates(["ship", "foundation", "ahead"])
+        return cells[~cells["kind"].isin(["none", ""])].drop_duplicates(["ship", "foundation", "ahead"])
     return cells.drop_duplicates(["ship", "ahead"])
 
 
@@ -406,17 +422,23 @@ class ExchangeLaw:
         ShipidError for a foundation that is no kind.
         """
         rng, own = np.random.default_rng(seed), self._own_rows()
-        cells = _cells_to_draw(ship, foundations, ahead, own)
+        cells, floors = _cells_to_draw(ship, foundations, ahead, self.own), np.ones(1)
         many = cells.drop(columns=["ship", "foundation"]).loc[np.tile(cells.index, draws)].reset_index(drop=True)
         many["kind"] = pd.Categorical(many["kind"].where(many["kind"] != ANY, rng.choice(FLAWS, len(many))))
         for name in ("baseline", "floor", "A"):
             unknown = cells[name].isna() & (cells["kind"] != "none" if name == "A" else True)
-            values = self._draw(name, cells[unknown], many[np.tile(unknown, draws)], draws, rng, sea=ship.sea)
+            known = own if name == "A" else None
+            values = self._draw(
+                name, cells[unknown], many[np.tile(unknown, draws)], draws, rng, known, floors, ship.sea
+            )
             if name == "floor":  # no physics is better than the true one
                 values = np.fmin(values, cells["A"].min())
+            if name == "floor" and own is not None and values.size:
+                values, floors = self._likely_floors(values, own, rng)
             many.loc[np.tile(unknown, draws), name] = values.ravel()
             cells.loc[unknown, name] = np.median(values, axis=0)
         for one in (cells, many):  # of what the physics adds to the floor, some have a share
+            one["A"] = one["A"].where(one["kind"] != "nominal", one["floor"])
             reducible = (one["A"] ** 2 - one["floor"] ** 2).clip(lower=0) * one["share"] ** 2
             one["A"] = one["A"].where(one["share"] == 1, np.sqrt(one["floor"] ** 2 + reducible))
         taught = np.array([amount for amount in amounts if amount > 0])
@@ -426,7 +448,7 @@ class ExchangeLaw:
         alone = many["A"].fillna(many["baseline"]).to_numpy().reshape(draws, -1, 1)
         result = np.repeat(alone, len(amounts), axis=2)
         shape = (draws, len(cells), len(taught))
-        result[:, :, np.array(amounts) > 0] = self._draw("H", asked, each, draws, rng, own).reshape(shape)
+        result[:, :, np.array(amounts) > 0] = self._draw("H", asked, each, draws, rng, own, floors).reshape(shape)
         return result
 
     def _draw(
@@ -437,16 +459,25 @@ class ExchangeLaw:
         draws: int,
         rng: np.random.Generator,
         own: pd.DataFrame | None = None,
+        floors: Array | float = 1.0,
         sea: str = "",
     ) -> Array:
         """Draws (draws, rows) of a response of cells; `many` has their rows once for each draw, with what was drawn."""
         part = self.parts[name]
         mean = part.mean(many)[0].reshape(draws, -1)
-        deviation = part.deviations(cells, len(SEAS) * draws if name == "floor" and sea else draws, rng, own)
+        deviation = part.deviations(cells, len(SEAS) * draws if name == "floor" and sea else draws, rng, own, floors)
         if len(deviation) > draws:
             third = np.array_split(np.argsort(deviation[:, 0]), len(SEAS))[SEAS.index(sea)]
             deviation = deviation[rng.permutation(third)]
         return np.asarray(np.exp(mean + deviation) * many[part.response.unit].to_numpy().reshape(draws, -1))
+
+    def _likely_floors(self, values: Array, own: pd.DataFrame, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draws of the floor (draws, rows) taken again as the known cells make them likely, and their factors."""
+        floors = values[:, 0] / np.median(values[:, 0])
+        likely = self.parts["H"].likelihood(own, floors) + self.parts["A"].likelihood(own, floors)
+        weights = np.exp(likely - likely.max())
+        taken = rng.choice(len(values), len(values), p=weights / weights.sum())
+        return values[taken], floors[taken]
 
     def _own_rows(self) -> pd.DataFrame | None:
         """Cells of the own ship with runs, their floor filled with what the law expects where it is not known."""

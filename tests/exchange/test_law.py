@@ -187,3 +187,28 @@ def test_tank_tests_have_a_third_and_identification_a_fifth_of_what_moderate_add
     asked = UnseenShip(100.0, 7.0, baseline=50.0, floor=2.0)
     better, moderate = (law.expect(asked, one, [0], 2.0, 50) for one in (kind, "moderate"))
     assert better**2 - 2.0**2 == pytest.approx((moderate**2 - 2.0**2) / part)
+
+
+def test_a_floor_that_is_not_known_is_what_the_law_expects(law, cells):
+    """Within what floors of ships scatter about it, and at most the least A."""
+    ratios = []
+    for _, ship in cells[(cells["kind"] != "nominal") & (cells["ahead"] == 2.0)].groupby("ship"):
+        found = law.given(ship.assign(floor=np.nan))._own_rows()["floor"]
+        assert found.max() <= ship["A"].min()
+        ratios.append(np.log(found.iloc[0] / ship["floor"].iloc[0]))
+    assert np.abs(ratios).mean() < 0.7
+
+
+def test_what_was_seen_of_a_ship_tells_of_its_floor(law):
+    """Runs with rough physics, and no true physics: the errors of that are then foretold better than before them."""
+    misses, inside = [], []
+    for _, ship in draw_cells(14, 3, KINDS).groupby("ship"):
+        true = ship[(ship["ahead"] == 2.0) & (ship["kind"] == "nominal")]
+        own = ship[(ship["ahead"] == 2.0) & (ship["kind"] != "nominal")].assign(floor=np.nan)
+        asked = UnseenShip(*true[["length", "speed", "baseline"]].iloc[0])
+        draws = [np.log(one.expect(asked, "nominal", [0], 2.0, 1000)[:, 0]) for one in (law, law.given(own))]
+        misses.append([np.abs(one - np.log(true["floor"].iloc[0])).mean() for one in draws])
+        inside.append(covered(draws[1][:, None], np.log(true["floor"].iloc[0]), 0.95))
+    before, after = np.mean(misses, axis=0)
+    assert after < 0.6 * before
+    assert np.mean(inside) > 0.8
