@@ -16,9 +16,7 @@ from typing import Any
 from shipid.arguments import check_choice
 from shipid.document import bundled_documents, read_document, value_at_path
 from shipid.errors import ShipidError
-from shipid.physics.signals import drive_scale, neutral_value
 from shipid.units import GRAVITY
-from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.regressions import (
     PITCHES,
@@ -30,7 +28,7 @@ from shipid.vessel.regressions import (
     thrust_polynomial,
     wave_resistance,
 )
-from shipid.vessel.stability import MOST_SHAFT, balanced_shaft_speed, bisect_root, straight_acceleration, yaw_growth
+from shipid.vessel.stability import bisect_root, service_shaft, straight_orders, yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -174,12 +172,11 @@ def finish_guess(
     speed: float,
     remarks: tuple[str, ...],
     unit: str = "rpm",
-    most: float = MOST_SHAFT,
 ) -> FirstGuess:
     """Check a document, line by line, and put above it what it needs for a speed [m/s] and whether it is stable."""
     body = "\n".join(lines)
     vessel = check_document(tomllib.loads(body), file)
-    n = service_shaft(vessel, speed, most)
+    n = service_shaft(vessel, speed)
     if n is None:
         raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
     rate = yaw_growth(vessel, speed, straight_orders(vessel, n))
@@ -640,18 +637,3 @@ def block_lines(path: str, values: Values, **words: str | int) -> Iterator[str]:
 def _quote_toml(text: str) -> str:
     """A string of TOML: that of JSON, but for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
-    """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
-    return {
-        name: n * drive_scale(name) if drive_scale(name) else neutral_value(name)
-        for name in vessel_dynamics(vessel).commands
-    }
-
-
-def service_shaft(vessel: Vessel, speed: float, most: float) -> float | None:
-    """Shaft speed [rev/s] or force (`drive_scale`) at which thrust equals resistance, by bisection up to a greatest."""
-    return balanced_shaft_speed(
-        lambda n: float(straight_acceleration(vessel, speed, straight_orders(vessel, n))[0]), most
-    )
