@@ -32,7 +32,7 @@ from shipid.study.prepare import obtain_runs, prepare, runs_by_amount
 from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
-from shipid.vessel.template import service_shaft
+from shipid.vessel.stability import service_shaft
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.strangers import stranger
@@ -74,7 +74,7 @@ def bundled_options(name: str) -> dict[str, Any]:
     block = vessel.parameters["inertia.m"] / (vessel.document["constants"]["rho"] * L * B * T)
     sizes = {"length": L, "beam": B, "draught": T, "block": min(max(block, 0.4), 0.9)}
     sizes |= {"propeller-diameter": 6.7} if name == "mariner" else {}  # 22 feet: the guess is too small for 60 rpm
-    rpm = 60 * (service_shaft(vessel, U, 1000.0) or 0.0)
+    rpm = 60 * (service_shaft(vessel, U) or 0.0)
     return sizes | {"speed": U, "rpm": rpm, "propulsor": propulsor, "shafts": shafts}
 
 

@@ -179,7 +179,7 @@ def study_ships(
     from shipid.exchange.campaign import run_ships
 
     count = usable_cores() if workers is None else workers
-    with end_on_interrupt("interrupted: finished ships are kept, the same command goes on"):
+    with end_on_interrupt("interrupted: what is finished is kept, the same command goes on"):
         for line in run_ships(out, seed, drawn, workers=count, shard=_parse_shard(shard) or (1, 1)):
             typer.echo(line)
 

@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from shipid.errors import DivergenceError, ResultError, ShipidError
@@ -133,10 +135,8 @@ def _template_of(ship: StudiedShip) -> Vessel | None:
     if ship.particulars is None:
         return None
     for given in (ship.particulars, replace(ship.particulars, rpm=None)):
-        try:
+        with suppress(ShipidError):
             return first_guess(given, "template", "template.toml").vessel
-        except ShipidError:
-            continue
     return None
 
 
@@ -237,8 +237,8 @@ def prepare_ship(plan: Plan) -> tuple[Plan, PreparedStudy]:
         kinds = [
             one | {"approach": approach} if one["kind"] == ZIGZAG else one
             for one in plan.document["truth"]["manoeuvre"]
+            if one["kind"] != ZIGZAG or approach
         ]
-        kinds = [one for one in kinds if one["kind"] != ZIGZAG or approach]
         document = {**plan.document, "truth": {**plan.document["truth"], "manoeuvre": kinds}}
         plan = build_plan(document, Path(plan.file), plan.vessels)
         try:
@@ -258,38 +258,50 @@ def prepare_ship(plan: Plan) -> tuple[Plan, PreparedStudy]:
             plan = build_plan({**plan.document, "family": families}, Path(plan.file), plan.vessels)
 
 
-def study_ship(name: str, seed: int = 0, drawn: int = DRAWN, amounts: Iterable[int] = AMOUNTS) -> pd.DataFrame:
-    """Cells of a ship, see `CELL_COLUMNS`; ShipidError where it cannot be studied."""
+def study_ship(name: str, seed: int, drawn: int, amounts: Iterable[int], part: Path) -> pd.DataFrame:
+    """Cells of a ship, see `CELL_COLUMNS`; ShipidError where it cannot be studied.
+
+    part : file that keeps the errors of each finished unit, from which an interrupted study goes on.
+    """
     ship = studied_ship(name, seed, drawn)
     plan, prepared = prepare_ship(plan_ship(ship, seed, drawn, amounts))
     test, speed, length = prepared.test, vessel_service_speed(ship.physics), float(ship.physics.length or 0)
-    alone = {one: position_error(paths, test.future) for one, paths in prepared.test_paths.items()}
-    results = [(one, 0, error) for one, error in alone.items() if one != NO_MODEL]
-    results += [
-        (str(cell.row["foundation"]), unit.batch.N_D, position_error(cell.paths, test.future))
-        for unit in plan.units
-        for cell in run_unit(plan, prepared, unit, "cpu")
-        if cell.paths is not None
-    ]
+    ends = [round(test.horizon * ahead / max(HORIZONS)) for ahead in HORIZONS]
+
+    def mean_errors(paths: np.ndarray) -> list[float]:
+        error = position_error(paths, test.future)
+        return [float(error[:end].mean()) for end in ends]
+
+    alone = {one: mean_errors(paths) for one, paths in prepared.test_paths.items()}
+    kept: dict[str, list[Any]] = read_json(part) if part.exists() else {}
+    for unit in plan.units:
+        if unit.key not in kept:
+            kept[unit.key] = [
+                (cell.row["foundation"], unit.batch.N_D, mean_errors(cell.paths))
+                for cell in run_unit(plan, prepared, unit, "cpu")
+                if cell.paths is not None
+            ]
+            write_json(part, kept)
+    results = [(one, 0, errors) for one, errors in alone.items() if one != NO_MODEL]
     kinds = {one.name: one.family.partition("-")[0] for one in prepared.foundations}
     rows = [
         {
             "ship": name, "type": ship.type, "bundled": name in BUNDLED, "length": length, "speed": speed,
             "froude": speed / math.sqrt(GRAVITY * length), "foundation": foundation, "kind": kinds[foundation],
-            "A": math.nan if foundation == NO_MODEL else float(alone[foundation][:end].mean()), "N_D": N_D,
-            "ahead": ahead, "H": float(error[:end].mean()), "baseline": float(prepared.naive[:end].mean()),
-            "floor": float(alone["nominal"][:end].mean()),
+            "A": math.nan if foundation == NO_MODEL else alone[foundation][place], "N_D": N_D,
+            "ahead": HORIZONS[place], "H": errors[place], "baseline": float(prepared.naive[:end].mean()),
+            "floor": alone["nominal"][place],
         }
-        for foundation, N_D, error in results
-        for ahead, end in ((ahead, round(test.horizon * ahead / max(HORIZONS))) for ahead in HORIZONS)
+        for foundation, N_D, errors in chain(results, *kept.values())
+        for place, end in enumerate(ends)
     ]  # fmt: skip
     return pd.DataFrame(rows)
 
 
-def _try_ship(seed: int, drawn: int, amounts: tuple[int, ...], name: str) -> pd.DataFrame | str:
+def _try_ship(folder: Path, seed: int, drawn: int, amounts: tuple[int, ...], name: str) -> pd.DataFrame | str:
     """Cells of a ship, or why it has none."""
     try:
-        return study_ship(name, seed, drawn, amounts)
+        return study_ship(name, seed, drawn, amounts, folder / f"{name}.json")
     except ShipidError as error:
         return str(error)
 
@@ -305,7 +317,8 @@ def run_ships(
 ) -> Iterator[str]:
     """Study the ships that are not finished in a folder, or every n-th of them from the i-th on; a line for each.
 
-    Each ship has its file, so that shards may share the folder; after each, `cells.parquet` and `cells.csv` are anew.
+    Each ship has its files, one of them while it is at work, so that shards may share the folder; after each,
+    `cells.csv` is anew.
 
     Raises ResultError for a folder of another study.
     """
@@ -316,18 +329,15 @@ def run_ships(
     if place.exists() and (known := read_json(place)) != settings:
         raise ResultError(f"holds the study over ships with {known}, not {settings}: take another folder", file=place)
     write_json(place, settings)
-    names = ship_names(drawn)[first - 1 :: every]
-    left = [name for name in names if not (folder / f"{name}.parquet").exists()]
-    for name, cells in on_workers(partial(_try_ship, seed, drawn, amounts), left, workers):
+    left = [one for one in ship_names(drawn)[first - 1 :: every] if not (folder / f"{one}.parquet").exists()]
+    for name, cells in on_workers(partial(_try_ship, folder, seed, drawn, amounts), left, workers):
         if isinstance(cells, str):
             yield f"{name} is left out: {cells}"
             continue
         with replace_whole(folder / f"{name}.parquet") as file:
             cells.to_parquet(file)
+        (folder / f"{name}.json").unlink(missing_ok=True)
         files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").exists()]
-        table = pd.concat(map(pd.read_parquet, files), ignore_index=True)
-        with replace_whole(folder / "cells.parquet") as file:
-            table.to_parquet(file)
         with replace_whole(folder / "cells.csv") as file:
-            table.to_csv(file, index=False)
+            pd.concat(map(pd.read_parquet, files)).to_csv(file, index=False)
         yield f"{name}: {len(cells)} cells; {len(files)} of {len(BUNDLED) + drawn} ships"

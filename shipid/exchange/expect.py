@@ -16,7 +16,7 @@ from shipid.exchange.law import ExchangeLaw, Physics, UnseenShip
 from shipid.metrics import error_of_windows, position_error
 from shipid.simulation.approach import vessel_service_speed
 from shipid.study.declared import NO_MODEL
-from shipid.study.new import draft_study
+from shipid.study.new import draft_simulated
 from shipid.study.plan import build_plan
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.results import Results
@@ -36,23 +36,18 @@ def meet_ship(vessel: str, ahead: float, out: Path) -> UnseenShip:
     Raises ShipidError where the vessel cannot make the truth of a study.
     """
     ship = load_vessel(vessel)
-    draft = draft_study([vessel], None, out).plan
+    draft = draft_simulated({ship.key: ship}, out, ahead).plan
     document: dict[str, Any] = deepcopy(dict(draft.document))
-    length, speed = float(ship.length or np.nan), vessel_service_speed(ship)
-    step, before = document["prediction"]["step"], document["prediction"]["ahead"]
-    horizon = max(round(ahead * length / (USUAL_SPEED * speed) / step), 1) * step
-    document["prediction"]["ahead"] = horizon
-    document["truth"] |= {
-        "manoeuvres": RUNS_TRIED + TESTS_TRIED,
-        "duration": document["truth"]["duration"] + horizon - before,
-    }
+    document["truth"]["manoeuvres"] = RUNS_TRIED + TESTS_TRIED
     document["split"]["test"], document["grid"]["N_D"] = TESTS_TRIED, [RUNS_TRIED]
     document["family"] = [one for one in document["family"] if one["name"] == "nominal"]
     document.pop("claims")
     plan = build_plan(document, out, draft.vessels)
     prepared = prepare(plan, obtain_runs(plan))
     floor = position_error(prepared.test_paths["nominal"], prepared.test.future).mean()
-    return UnseenShip(length, speed, float(prepared.naive.mean()), float(floor))
+    return UnseenShip(
+        float(ship.length or np.nan), vessel_service_speed(ship), float(prepared.naive.mean()), float(floor)
+    )
 
 
 def study_cells(results: Results) -> tuple[pd.DataFrame, UnseenShip]:
@@ -69,15 +64,13 @@ def study_cells(results: Results) -> tuple[pd.DataFrame, UnseenShip]:
     cells = cells[cells["status"] == "ok"].groupby(["foundation", "family", "N_D"], as_index=False)[["A", "H"]].mean()
     if cells.empty:
         raise ShipidError("no cell has a result: run the study first", file=results.folder)
-    baseline = float(error_of_windows(results.naive).mean())
-    ship = UnseenShip(length, speed, baseline)
-    nominal = cells["A"][cells["family"] == "nominal"]
+    ship = UnseenShip(length, speed, float(error_of_windows(results.naive).mean()))
     kinds = cells["family"].where(cells["family"].isin([*CELL_KINDS]), "")
     known: dict[str, Any] = {
         "ship": results.plan.name, "type": "", "bundled": False, "length": length, "speed": speed,
         "froude": ship.froude, "kind": kinds.mask(cells["foundation"] == NO_MODEL, "none"),
         "ahead": results.test.horizon * results.test.step * USUAL_SPEED * speed / length,
-        "baseline": baseline, "floor": nominal.mean(),
+        "baseline": ship.baseline, "floor": cells["A"][cells["family"] == "nominal"].mean(),
     }  # fmt: skip
     return cells.assign(**known), ship
 
@@ -94,8 +87,7 @@ def expected_errors(
     table = pd.DataFrame(rows, columns=["physics", "N_D"])
     for name, values in {"{}": draws, "ratio_{}": draws / draws[:, :1]}.items():
         low, middle, high = np.quantile(values, [0.025, 0.5, 0.975], axis=0)
-        columns = {name.format("H"): middle, name.format("low"): low, name.format("high"): high}
-        table = table.assign(**columns)
+        table = table.assign(**{name.format("H"): middle, name.format("low"): low, name.format("high"): high})
     return table.rename(columns={"ratio_H": "ratio"})
 
 

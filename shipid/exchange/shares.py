@@ -102,9 +102,8 @@ def _member_errors(results: Results, models: Sequence[str], N_D: int) -> dict[st
     """Model -> g [m^1/2] over windows and draws of runs; what lacks a draw or a finite path is left out."""
     cells, true = results.judged_cells, results.test.future
     mine = cells[cells["N_D"].eq(N_D) & cells["status"].eq("ok")].groupby("model")["cell"]
-    alone = {model: [results.physics[model]] for model in models if model in results.physics}
     found = {str(model): [results.paths[cell] for cell in drawn] for model, drawn in mine if model in models}
-    found = found if N_D else alone
+    found = found if N_D else {model: [results.physics[model]] for model in models if model in results.physics}
     draws, windows = max(map(len, found.values()), default=0), even_places(true.shape[1], MOST_WINDOWS)
     result = {}
     for model, paths in found.items():

@@ -88,7 +88,7 @@ def _takeaway_shares(content: ReportContent) -> str:
         shares = zip(found["number"], *(found[name].map("{:.1%}".format) for name in ENDS), strict=True)
         words = join_few_names([f"{name} {share} ({low} to {high})" for name, share, low, high in shares])
         members, needed = mine[["members", "needed"]].iloc[0]
-        unknown = f"{members} members cannot tell; about {needed} might (members = {needed} in the study)"
+        unknown = f"{members} members cannot tell; about {needed} might: --set family.{family}.members={needed}"
         parts.append(f"{family} with N_D = {N_D}: {words if len(found) else unknown}.")
     return " ".join(parts)
 

@@ -21,7 +21,7 @@ from shipid.physics.signals import ACTUAL, SIGNALS, drive_scale, is_shaft, is_st
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import MOST_FORCE, MOST_SHAFT, balanced_shaft_speed, bisect_root, straight_acceleration
+from shipid.vessel.stability import bisect_root, service_shaft, straight_acceleration
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
 FROUDE = 0.2  # of the service speed of a ship whose document gives none
@@ -119,7 +119,7 @@ class Controls:
         At another ratio of speed and shaft speed the polynomials of a screw, or a hull about that speed, may not hold.
         """
         speed = vessel_service_speed(self.vessel)
-        n = balanced_shaft(self, speed)
+        n = service_shaft(self.vessel, speed)
         if n is None:  # nothing drives it so fast, or nothing holds it back
             n = PROBE_SHAFT
             speed = min(_balanced_speed(self.vessel, self.ahead(n)), speed)
@@ -165,11 +165,7 @@ def vessel_service_speed(vessel: Vessel) -> float:
 
 def balanced_shaft(controls: Controls, speed: float) -> float | None:
     """Shaft speed [rev/s] at which a ship straight ahead at a speed [m/s] keeps it; None if there is none."""
-
-    def surplus(n: float) -> float:
-        return float(straight_acceleration(controls.vessel, speed, controls.ahead(n))[0])
-
-    return balanced_shaft_speed(surplus, MOST_SHAFT if controls.drive_unit == "rpm" else MOST_FORCE)
+    return service_shaft(controls.vessel, speed)
 
 
 class NotStraight(ShipidError):

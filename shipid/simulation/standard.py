@@ -11,11 +11,12 @@ import numpy as np
 from shipid.arguments import as_float_array, check_choice, check_class, check_number, check_positive
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError
-from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
+from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import KINDS, MOST_HEADING, MOST_HELM, Trial
 from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import RPM, plural_word
 from shipid.vessel.load import Vessel
+from shipid.vessel.stability import service_shaft
 
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 MOST_STEPS = 1e7  # of a manoeuvre
@@ -135,7 +136,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
             f"{speed:g} m/s: the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s", path="--speed"
         )
     _ = controls.drives  # DocumentError where nothing drives it, at any speed
-    n = balanced_shaft(controls, speed)
+    n = service_shaft(controls.vessel, speed)
     if n is None:
         raise ShipidError(
             f"no shaft speed or force drives {controls.vessel.name} at {speed:g} m/s: give a lower speed",

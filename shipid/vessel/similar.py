@@ -30,8 +30,8 @@ from shipid.vessel.schema import (
     structural_keys,
     term_blocks,
 )
-from shipid.vessel.stability import MOST_FORCE, bisect_root, straight_acceleration
-from shipid.vessel.template import MODEL, NU, RHO_SEA, service_shaft, straight_orders
+from shipid.vessel.stability import bisect_root, service_shaft, straight_acceleration, straight_orders
+from shipid.vessel.template import MODEL, NU, RHO_SEA
 
 TAYLOR = 2.6
 """Wetted surface over sqrt(volume x length), Taylor (1910)."""
@@ -39,7 +39,7 @@ SPREADS = {"L/B": 0.3, "B/T": 0.3, "C_b": 0.12, "Fn": 0.08, "L": 2.0}
 """What counts as one unit of distance: of C_b and the Froude number as they are, of the others in the logarithm."""
 ALIKE = 0.05  # differences of features up to which two vessels count as one ship
 SCREW = ("D_p", "T_nn", "T_nu", "dT_nu", "T_uu", "c_un", "c_nn", "n_0")  # numbers that go with the size of a screw
-SCREW_SIZES = (0.5, 2.0)  # least and greatest change of a screw's size
+SCREW_SIZES, SHAFT_RATIOS = (0.5, 2.0), (0.1, 10.0)  # least and greatest change of a screw's size, and of n_0 alone
 TUNNEL = "thruster.tunnel"
 ABOUT_SERVICE = "thruster.service_speed"  # thrust less resistance in one polynomial: neither is there alone
 
@@ -155,7 +155,7 @@ def _similar_vessel(known: Mapping[str, float], vessel: Vessel, own: Vessel | No
     ratio = known["L_pp"] / before["L_pp"]
     scaled = scale_vessel(vessel, ratio, None if own is None else own.document.get("constants", {}).get("rho"))
     speed = known.get("U_0") or before.get("U_0", 0.2 * math.sqrt(GRAVITY * before["L_pp"])) * math.sqrt(ratio)
-    shaft = service_shaft(own or scaled, speed, MOST_FORCE)
+    shaft = service_shaft(own or scaled, speed)
     if own is not None:
         scaled = _drive_like(scaled, own, notes)
     if ABOUT_SERVICE not in _term_keys(scaled):
@@ -225,10 +225,12 @@ def friction_change(vessel: Vessel, ratio: float, speed: float) -> float:
 def fit_screws(vessel: Vessel, speed: float, shaft: float) -> tuple[Vessel, float]:
     """The vessel with all screws larger by one factor, so that it holds a speed [m/s] at a shaft speed [rev/s].
 
-    Also the factor: 1 where none from 0.5 to 2 does. A screw about its service speed gets another shaft speed.
+    Also the factor: 1 where none from 0.5 to 2 does. A screw about its service speed gets another shaft speed, from a
+    tenth to ten times.
     """
     screws = {path: unit for path, unit in vessel.units.items() if path.rpartition(".")[2] in SCREW}
-    orders, (low, high) = straight_orders(vessel, shaft), SCREW_SIZES
+    orders, of_shaft = straight_orders(vessel, shaft), all(path.endswith(".n_0") for path in screws)
+    low, high = SHAFT_RATIOS if of_shaft else SCREW_SIZES
 
     def with_size(factor: float) -> Vessel:
         sizes = {"m": factor, "kg": factor**3, "s": factor}  # of n_0 alone

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from shipid.physics.signals import is_steering, neutral_value
+from shipid.physics.signals import drive_scale, is_shaft, is_steering, neutral_value
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -27,8 +27,19 @@ def bisect_root(function: Callable[[float], float], low: float, high: float, hal
     return high
 
 
-def balanced_shaft_speed(surplus: Callable[[float], float], most: float = MOST_SHAFT) -> float | None:
-    """Shaft speed [rev/s] up to a greatest one where a surplus of thrust, which grows with it, is 0; else None."""
+def straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
+    """Commands [SI] with all that drives the ship at n [rev/s] (`drive_scale`), and the helm amidships."""
+    return {name: n * drive_scale(name) or neutral_value(name) for name in vessel_dynamics(vessel).commands}
+
+
+def service_shaft(vessel: Vessel, speed: float) -> float | None:
+    """Shaft speed [rev/s] or force (`drive_scale`) that holds a speed [m/s] straight ahead; None if there is none."""
+
+    def surplus(n: float) -> float:
+        return float(straight_acceleration(vessel, speed, straight_orders(vessel, n))[0])
+
+    drives = filter(drive_scale, vessel_dynamics(vessel).commands)
+    most = MOST_SHAFT if all(map(is_shaft, drives)) else MOST_FORCE
     low, high = 0.0, 1.0
     while surplus(high) < 0:
         if high >= most:

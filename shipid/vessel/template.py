@@ -11,14 +11,13 @@ import math
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from shipid.arguments import check_choice
 from shipid.document import bundled_documents, read_document, value_at_path
 from shipid.errors import ShipidError
-from shipid.physics.signals import drive_scale, neutral_value
 from shipid.units import GRAVITY
-from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.regressions import (
     PITCHES,
@@ -30,7 +29,7 @@ from shipid.vessel.regressions import (
     thrust_polynomial,
     wave_resistance,
 )
-from shipid.vessel.stability import MOST_SHAFT, balanced_shaft_speed, bisect_root, straight_acceleration, yaw_growth
+from shipid.vessel.stability import bisect_root, service_shaft, straight_orders, yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -174,12 +173,11 @@ def finish_guess(
     speed: float,
     remarks: tuple[str, ...],
     unit: str = "rpm",
-    most: float = MOST_SHAFT,
 ) -> FirstGuess:
     """Check a document, line by line, and put above it what it needs for a speed [m/s] and whether it is stable."""
     body = "\n".join(lines)
     vessel = check_document(tomllib.loads(body), file)
-    n = service_shaft(vessel, speed, most)
+    n = service_shaft(vessel, speed)
     if n is None:
         raise ShipidError(f"no shaft speed or force drives this ship at {speed:.3g} m/s: give a lower speed")
     rate = yaw_growth(vessel, speed, straight_orders(vessel, n))
@@ -415,7 +413,9 @@ def guess_screw(given: Particulars) -> tuple[float, tuple[float, float, float], 
         if least < wanted < most:
             D, words = wanted, f"drives {given.service:.3g} m/s at {60 * n:.4g} rpm with P / D = {PITCH:g}"
     if not _is_pitch_between(given, D, n, PITCHES):
-        low, high = sorted(60 * _shaft_speed_of_screw(given, D, pitch) for pitch in PITCHES)
+        low, high = sorted(
+            60 * bisect_root(partial(_thrust_surplus, given, D, pitch=ratio), 0, FASTEST) for ratio in PITCHES
+        )
         raise ShipidError(
             f"no screw of {D:.3g} m drives this ship at {given.service:.3g} m/s with {60 * n:.4g} rpm: {low:.3g} to "
             f"{high:.3g} rpm could. Is it the engine's speed, not the screw's? Is --speed another one?",
@@ -430,11 +430,6 @@ def _is_pitch_between(given: Particulars, D: float, n: float, pitches: tuple[flo
     """Whether a pitch ratio between two gives a screw the thrust that the ship needs."""
     weak, strong = (_thrust_surplus(given, D, n, pitch) for pitch in pitches)
     return weak <= 0 <= strong
-
-
-def _shaft_speed_of_screw(given: Particulars, D: float, pitch: float) -> float:
-    """Shaft speed [rev/s] at which a screw drives the ship at its service speed."""
-    return bisect_root(lambda n: _thrust_surplus(given, D, n, pitch), 0.0, FASTEST)
 
 
 def _thrust_surplus(given: Particulars, D: float, n: float, pitch: float) -> float:
@@ -471,8 +466,7 @@ def rudder_values(given: Particulars, side: int = 0) -> Values:
     """One rudder behind a screw; side -1 is that to port of two."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     share, words = (1.0, "") if given.units == 1 else (0.6, ", 0.6 of it each")
-    area = share * L * T / 100 * (1 + 25 * (B / L) ** 2)
-    A_R = given.rudder_area or area
+    A_R = given.rudder_area or share * L * T / 100 * (1 + 25 * (B / L) ** 2)
     H_R = min(math.sqrt(1.6 * A_R), 0.9 * T)
     aspect = H_R**2 / A_R
     epsilon = 2.26 - 1.82 * (1 - _wake_fraction(given)[0])
@@ -520,13 +514,12 @@ def azimuth_values(given: Particulars, side: int) -> Values:
         "D_p": TemplateValue(D, "m", size),
         "k_T": TemplateValue(k_T, "-", strength),
     }
-    numbers: dict[str, float] = {}
-    for name, number in unit.items():
-        table = (
-            {f'{name}."{key}"': one for key, one in number.items()} if isinstance(number, Mapping) else {name: number}
-        )
-        numbers |= {key: one for key, one in table.items() if isinstance(one, float) and key not in placed}
-    copied = {name: TemplateValue(number, "-", "unit of R/V Gunnerus") for name, number in numbers.items()}
+    tables = {f'{name}."{key}"': one for name in ("K_x", "K_y") for key, one in unit[name].items()}
+    copied = {
+        name: TemplateValue(number, "-", "unit of R/V Gunnerus")
+        for name, number in (unit | tables).items()
+        if isinstance(number, float) and name not in placed
+    }
     gear = f"two turns a minute: a guess{given.faster[1]}"
     lag = {
         "actuator.alpha.T": TemplateValue(0.5 / given.faster[0], "s", f"0.5 s of a ship: a guess{_over_words(given)}"),
@@ -640,18 +633,3 @@ def block_lines(path: str, values: Values, **words: str | int) -> Iterator[str]:
 def _quote_toml(text: str) -> str:
     """A string of TOML: that of JSON, but for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
-    """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
-    return {
-        name: n * drive_scale(name) if drive_scale(name) else neutral_value(name)
-        for name in vessel_dynamics(vessel).commands
-    }
-
-
-def service_shaft(vessel: Vessel, speed: float, most: float) -> float | None:
-    """Shaft speed [rev/s] or force (`drive_scale`) at which thrust equals resistance, by bisection up to a greatest."""
-    return balanced_shaft_speed(
-        lambda n: float(straight_acceleration(vessel, speed, straight_orders(vessel, n))[0]), most
-    )

@@ -14,7 +14,6 @@ from functools import cached_property
 
 from shipid.errors import ShipidError
 from shipid.units import GRAVITY
-from shipid.vessel.stability import MOST_FORCE
 from shipid.vessel.template import (
     RHO_SEA,
     FirstGuess,
@@ -76,7 +75,7 @@ def guess_craft(given: SmallCraft, name: str, file: str) -> FirstGuess:
     """Fill a vessel document of a small craft; ShipidError for one that cannot be, or that nothing steers."""
     _check_craft(given)
     speed, remarks = CRUISE * given.top_speed, tuple(_craft_remarks(given))
-    return finish_guess(_craft_lines(given, name), file, speed, remarks, "N of each thruster", MOST_FORCE)
+    return finish_guess(_craft_lines(given, name), file, speed, remarks, "N of each thruster")
 
 
 def _check_craft(given: SmallCraft) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -51,8 +52,8 @@ def test_the_study_of_a_ship_has_its_own_sizes(name: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def cells() -> pd.DataFrame:
-    return study_ship("drawn-01", SEED, DRAWN, AMOUNTS)
+def cells(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    return study_ship("drawn-01", SEED, DRAWN, AMOUNTS, tmp_path_factory.mktemp("ship") / "part.json")
 
 
 @pytest.mark.slow
@@ -78,12 +79,26 @@ def test_shards_and_an_interrupted_run_give_equal_digits(
     assert len([*run_ships(whole, SEED, DRAWN, AMOUNTS)]) == 2
     for shard in ((2, 2), (1, 2)):
         assert len([*run_ships(parts, SEED, DRAWN, AMOUNTS, shard=shard)]) == 1
-    table = pd.read_parquet(whole / "cells.parquet")
-    pd.testing.assert_frame_equal(table, pd.read_parquet(parts / "cells.parquet"), check_exact=True)
-    pd.testing.assert_frame_equal(table[table["ship"] == "drawn-01"], cells, check_exact=True)
+    table = pd.read_csv(whole / "cells.csv")
+    pd.testing.assert_frame_equal(table, pd.read_csv(parts / "cells.csv"), check_exact=True)
+    pd.testing.assert_frame_equal(pd.read_parquet(whole / "drawn-01.parquet"), cells, check_exact=True)
     (whole / "drawn-01.parquet").unlink()
+    assert [file.name for file in whole.glob("*.json")] == ["ships.json"]
+    done, run_unit = list[str](), campaign.run_unit
+
+    def interrupt(*given: Any) -> Any:
+        if len(done) == 7:
+            done.append("interrupted")
+            raise KeyboardInterrupt
+        done.append(given[2].key)
+        return run_unit(*given)
+
+    monkeypatch.setattr(campaign, "run_unit", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        next(run_ships(whole, SEED, DRAWN, AMOUNTS))
     assert len([*run_ships(whole, SEED, DRAWN, AMOUNTS)]) == 1  # the other one is kept
-    pd.testing.assert_frame_equal(table, pd.read_parquet(whole / "cells.parquet"), check_exact=True)
+    assert len({*done}) == len(done)  # and no unit is computed twice
+    pd.testing.assert_frame_equal(table, pd.read_csv(whole / "cells.csv"), check_exact=True)
 
 
 def test_a_ship_that_fails_is_a_line_and_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

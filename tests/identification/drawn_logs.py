@@ -17,10 +17,11 @@ from shipid.identification.fit import Solution
 from shipid.identification.free_run import ALL, simulate_free_runs, with_current
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.simulation.approach import Controls, balanced_shaft
+from shipid.simulation.approach import Controls
 from shipid.simulation.log import log_columns
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.stability import service_shaft
 
 BASES = (
     "cybership2", "esso-190k", "gunnerus-28.9", "gunnerus-33.9", "gunnerus-33.9-template", "kvlcc2-hsva", "kvlcc2-l7",
@@ -87,7 +88,7 @@ def scaled_vessel(vessel: Vessel, scale: float) -> Vessel:
 def _orders(vessel: Vessel, speed: float, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Command -> (ROWS, runs): shafts about those of the speed, and helm to both sides, held for a while."""
     controls, shape = Controls(vessel), (-(-ROWS // HELD), RUNS + TESTS)
-    shaft = balanced_shaft(controls, speed) or 0.0
+    shaft = service_shaft(controls.vessel, speed) or 0.0
 
     def held(low: float, high: float) -> np.ndarray:
         return np.repeat(rng.uniform(low, high, shape), HELD, axis=0)[:ROWS]
@@ -112,7 +113,7 @@ def drawn_log(seed: int, speeds: tuple[float, float] = (0.1, 12.0)) -> DrawnLog:
         length, froude = float(np.exp(rng.uniform(0, np.log(300)))), float(rng.uniform(0.03, 0.25))
         speed = froude * float(np.sqrt(9.81 * length))
         truth = scaled_vessel(base, length / base.length)
-        if speeds[0] <= speed <= speeds[1] and balanced_shaft(Controls(truth), speed):
+        if speeds[0] <= speed <= speeds[1] and service_shaft(truth, speed):
             break
     coefficients = [path for path, x in truth.parameters.items() if FREE.fullmatch(path) and x]
     truth = truth.with_values({path: truth.parameters[path] * rng.uniform(0.9, 1.1) for path in coefficients})

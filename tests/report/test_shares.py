@@ -38,7 +38,7 @@ def test_what_is_told_and_what_cannot_be_told() -> None:
     assert figure is not None
     told, unknown = figure.takeaway.split(". few")
     assert told == "many with N_D = 30: hull.n_7 35.0% (25.0% to 45.0%)"
-    assert unknown == " with N_D = 30: 3 members cannot tell; about 42 might (members = 42 in the study)."
+    assert unknown == " with N_D = 30: 3 members cannot tell; about 42 might: --set family.few.members=42."
 
 
 def test_the_largest_shares_are_drawn_with_their_intervals() -> None:

@@ -10,12 +10,11 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.simulation.approach import (
     Controls,
     NotStraight,
-    balanced_shaft,
     steady_approach,
 )
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.stability import straight_acceleration
+from shipid.vessel.stability import service_shaft, straight_acceleration
 from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import PATCHED
 
@@ -101,7 +100,7 @@ def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> N
             lambda u, n=shaft: straight_acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft
         )
         assert steadily.state["u"][0] == pytest.approx(balanced[0], rel=0.015)
-    creeping = balanced_shaft(tanker, 0.2) or 0.0  # she was said to be steady at 0.15 m/s, and at 0.1 m/s at rest
+    creeping = service_shaft(tanker.vessel, 0.2) or 0.0  # she was said to be steady at 0.15 m/s, and at 0.1 m/s at rest
     slowly = steady_approach(tanker, np.array([creeping]), step=30.0, method="rk4", engine="casadi")
     assert slowly.state["u"][0] == pytest.approx(0.2, rel=0.015)
     stopped = steady_approach(tanker, np.array([0.0, 1e-4]), step=1.0, method="euler", engine="casadi")

@@ -26,8 +26,7 @@ from shipid.vessel.similar import (
     similar_vessels,
     vessel_particulars,
 )
-from shipid.vessel.stability import straight_acceleration
-from shipid.vessel.template import service_shaft, straight_orders
+from shipid.vessel.stability import service_shaft, straight_acceleration, straight_orders
 
 EVERY = pytest.mark.parametrize("name", list(bundled_documents("models")))
 LIKE_ESSO = {"L_pp": 320.0, "B": 50.0, "T": 19.0, "C_b": 0.82, "U_0": 8.0}
@@ -58,7 +57,7 @@ def test_a_scaled_ship_performs_the_same_path_in_ship_lengths(name: str, ratio: 
     vessel = vessel.with_values({"wind.off": True}) if "wind" in vessel.document else vessel
     scaled, fast = scale_vessel(vessel, ratio, rho), math.sqrt(ratio)
     U = vessel_particulars(vessel).get("U_0", 3.0)
-    n = service_shaft(vessel, U, 1000.0) or 0.0
+    n = service_shaft(vessel, U) or 0.0
     turned = {path: 0.3 for path in vessel_dynamics(vessel).commands if path.endswith(("delta", "alpha"))}
     shafts = [path for path in vessel_dynamics(vessel).commands if path not in turned]
     paths = []
@@ -94,7 +93,7 @@ def test_friction_is_that_of_the_ittc_line() -> None:
 def test_screws_hold_the_speed_at_the_shaft_speed(name: str) -> None:
     vessel = load_vessel(name)
     U = vessel_particulars(vessel).get("U_0", 3.0)
-    n = 1.1 * (service_shaft(vessel, U, 1000.0) or 0.0)
+    n = 1.1 * (service_shaft(vessel, U) or 0.0)
     fitted, factor = fit_screws(vessel, U, n)
     assert SCREW_SIZES[0] < factor <= 1
     assert straight_acceleration(fitted, U, straight_orders(fitted, n))[0] == pytest.approx(0, abs=1e-8)
@@ -149,3 +148,11 @@ def test_a_ship_driven_otherwise_lends_its_hull_alone() -> None:
     assert "screws and helms are those of your own ship" in found["gunnerus-28.9"].document["source"]
     assert vessel_dynamics(found["cybership2"]).commands == vessel_dynamics(own).commands
     assert "mariner" not in found  # its thrust and resistance are one polynomial
+
+
+def test_a_screw_about_its_service_speed_takes_any_shaft_speed() -> None:
+    vessel = load_vessel("mariner")
+    for n in (0.2, 4.1):  # geared otherwise: the speed is held all the same
+        fitted, factor = fit_screws(vessel, 7.7, n)
+        assert factor != 1.0
+        assert straight_acceleration(fitted, 7.7, straight_orders(fitted, n))[0] == pytest.approx(0, abs=1e-8)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shipid.engine.rollout import rollout
-from shipid.simulation.approach import Controls, balanced_shaft
+from shipid.simulation.approach import Controls
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document, load_vessel
-from shipid.vessel.stability import yaw_growth, yaw_growths
+from shipid.vessel.stability import service_shaft, yaw_growth, yaw_growths
 
 U, M, I_Z, Y_VDOT, N_RDOT = 4.0, 2e5, 2e7, -1.5e5, -1.2e7
 Y_V, Y_R, N_R = -4e4, 1e5, -4e6
@@ -55,7 +55,7 @@ def test_a_ship_whose_sides_differ_has_two(side: int) -> None:
     """KVLCC2 in a simulation: a yaw of 1e-6 to starboard dies out, one to port grows."""
     vessel = load_vessel("kvlcc2-l7")
     controls = Controls(vessel)
-    n = balanced_shaft(controls, 1.1787)
+    n = service_shaft(vessel, 1.1787)
     assert n is not None
     rates = yaw_growths(vessel, 1.1787, controls.ahead(n))
     assert rates[0] < 0 < rates[1] == yaw_growth(vessel, 1.1787, controls.ahead(n))
