@@ -64,7 +64,7 @@ DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
     ),
     "position spikes": (
         lambda frame: frame.assign(N=frame["N"] + np.where(frame["time"] == 300.0, 90.0, 0.0)),
-        r"comes back near t = 300",
+        r"comes back in 1 row at 1 place, near t = 300",
     ),
     "late position": (lambda frame: late(frame, ["N", "E"], 1.5), r"1\.\d s later than the velocity"),
 }
