@@ -26,12 +26,16 @@ DAY_OF_EXCEL = r"(?:3[3-9]|4\d|5[0-4])\d{3}"
 EXCEL = 25569  # day of Excel of 1 January 1970
 FRACTION = r"0|0?\.\d+|\d(?:\.\d+)?[eE]-\d+"
 """A time of day as a part of a day."""
-ORDINAL = r"^(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?$"
-"""A date with the day of the year: 2024-135 08:00:00, 2024:135:08:00:00.5."""
 UTC_BEHIND = r"\s+(?:UTC|GMT)$"
 """The end of a date that says in letters that it has no other zone."""
-COMPACT = r"^(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,9}))?$"
+COMPACT = r"(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,8})\d?)?"
 """A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
+JOINED = (
+    (r"(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?", r"\1 \2 \3", "%Y %j %H:%M:%S"),
+    (COMPACT, r"\1 \2.\g<3>0", "%Y%m%d %H%M%S.%f"),
+)
+"""How dates are joined with times of day, with blanks between them, and how these are then written: with the day of the
+year, 2024-135 08:00:00 or 2024:135:08:00:00.5, or in one number."""
 DURATION = (
     r"[+-]?\d+(?:\.\d+)? ?(?:d|days?|h|hrs?|hours?|min|minutes?|s|secs?|seconds?|ms)(?: \+?\d+:\d\d:\d\d(?:\.\d+)?)?"
 )
@@ -93,14 +97,10 @@ def parse_dates(dates: pd.Series[Any]) -> Array:
         if len(texts) and texts.str.fullmatch(DURATION).all():
             since = pd.to_timedelta(texts, errors="coerce").dt.total_seconds()
             return np.array(since.reindex(dates.index), dtype=np.float64)
-        ordinal = texts.str.extract(ORDINAL)
-        if len(texts) and ordinal.notna().all(axis=None):
-            joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]
-            return _since_1970(_parse_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
-        compact = texts.str.extract(COMPACT)
-        if len(texts) and compact[[0, 1]].notna().all(axis=None):
-            joined = compact[0] + " " + compact[1] + "." + compact[2].fillna("0")
-            return _since_1970(_parse_moments(joined, "%Y%m%d %H%M%S.%f").reindex(dates.index))
+        for form, parts, way in JOINED:
+            if len(texts) and texts.str.fullmatch(form).all():
+                joined = texts.str.replace(form, parts, regex=True)
+                return _since_1970(_parse_moments(joined, way).reindex(dates.index))
         written = date_formats(texts)
         if written:
             moments = min(

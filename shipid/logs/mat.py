@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import struct
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -136,17 +134,5 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
 
 
 def is_mat(_: Path, head: bytes) -> dict[str, Any] | None:
-    """Recognise a MATLAB file by its first words, or of version 4; one of version 7.3, too, which has a remedy."""
-    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) or _is_version_4(head) else None
-
-
-def _is_version_4(head: bytes) -> bool:
-    """Whether a file begins with the type, size and name of a matrix as MATLAB 4 writes them: five integers, a word."""
-    if len(head) < 20:
-        return False
-    for order, machine in (("<", 0), (">", 1)):
-        kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", head[:20])
-        known = kind in {1000 * machine + 10 * number + shape for number in range(6) for shape in range(3)}
-        if known and min(rows, columns) >= 0 and is_complex in (0, 1) and 1 < length <= 64:
-            return re.fullmatch(rb"[A-Za-z]\w*\0", head[20 : 20 + length]) is not None
-    return False
+    """Recognise a MATLAB file by its first words; one of version 7.3, too, which has a remedy. Version 4 has none."""
+    return {"kind": "mat"} if head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) else None

@@ -341,7 +341,9 @@ def stamp_times(stamps: list[str]) -> Array:
     words = pd.Series(stamps, dtype="string").str.strip().str.rstrip(",;")
     tags = words.str.extract(_TAG_TIME)[0].astype("Float64")
     tags = tags.where(tags < 1e11, tags / 1000.0)  # some write milliseconds
-    numbers = pd.to_numeric(words.mask(words.str.match(COMPACT)), errors="coerce")  # 20240514080000 is a number, too
+    numbers = pd.to_numeric(
+        words.mask(words.str.fullmatch(COMPACT)), errors="coerce"
+    )  # 20240514080000 is a number, too
     dates = parse_dates(
         words.where(words.str.match(_STAMP_DATE) & numbers.isna()).str.replace(r"[;,]", " ", regex=True).astype(object)
     )

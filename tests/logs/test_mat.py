@@ -60,7 +60,7 @@ def test_a_matlab_file_of_version_7_3_has_its_remedy(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
-def test_a_file_of_matlab_4_is_recognised(order: str, log: pd.DataFrame, tmp_path: Path) -> None:
+def test_a_file_of_matlab_4_is_read_where_its_kind_is_said(order: str, log: pd.DataFrame, tmp_path: Path) -> None:
     """It begins with no word, but with five integers: type, rows, columns, whether complex, length of the name."""
     content = b""
     for name in log:
@@ -68,8 +68,5 @@ def test_a_file_of_matlab_4_is_recognised(order: str, log: pd.DataFrame, tmp_pat
         content += np.array(sizes, f"{order}i4").tobytes() + name.encode() + b"\0"
         content += log[name].to_numpy().astype(f"{order}f8").tobytes()
     (tmp_path / "log.mat").write_bytes(content)
-    assert is_mat(tmp_path / "log.mat", content) == {"kind": "mat"}
+    assert is_mat(tmp_path / "log.mat", content) is None
     assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"'), tmp_path / "log.mat")
-    for seed in range(200):
-        draw = np.random.default_rng(seed)
-        assert is_mat(Path("x"), draw.integers(0, 256, 200, dtype=np.uint8).tobytes()) is None

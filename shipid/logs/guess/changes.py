@@ -61,7 +61,6 @@ def _ask_about_scales(state: State, edges: list[int], parts: list[Windows], file
     for about, columns, seen, path in relations:
         odd, ratio = odd_scales(seen, change(path), parts)
         if odd:
-            state.changed |= {*about}
             place = _place_of_parts(state, edges, odd, files)
             words = f"has {' and '.join(map(repr, columns))} another unit or sign {place}? There the motion is"
             state.ask(about, f"{words} {ratio:.3g} times as much, beside its integral, as elsewhere. {REMEDY}")
@@ -116,12 +115,9 @@ def _ask_about_senses(state: State, edges: list[int], parts: list[Windows], file
             if part.sum() < FEWEST or np.median(speed[part]) < fast:
                 continue
             rows = slice(*ends)
-            signals = state.t[rows], r[rows], state.columns[one.source][rows]
-            effect = evidence.order_effect(*signals, state.part) / SETTINGS.seen
-            follows = evidence.order_correlation(*signals, 2 * state.part) / SETTINGS.followed
-            told = effect if abs(effect) >= 1.0 else follows
-            if abs(told) > 2.0:
-                senses[number] = float(np.sign(told))
+            effect = evidence.order_effect(state.t[rows], r[rows], state.columns[one.source][rows], state.part)
+            if abs(effect) > 2.0 * SETTINGS.seen:
+                senses[number] = float(np.sign(effect))
         usual = sum(senses.values()) + 0.5 * state.turning.get(one.source, next(iter(senses.values()), 0.0))
         odd = [number for number, sense in senses.items() if sense * usual < 0.0]
         if odd:

@@ -21,7 +21,6 @@ from shipid.logs.dates import (
     LAST_DATE,
     NEXT_DAY,
     TIME_OF_DAY,
-    ZONE_REMEDY,
     date_formats,
     date_texts,
     days_with_marks,
@@ -29,7 +28,6 @@ from shipid.logs.dates import (
     format_moment,
     in_one_number,
     join_date_and_time,
-    other_zone,
     parse_dates,
     parse_dates_as,
     rollover_words,
@@ -251,15 +249,6 @@ def _of_numbers(
     rate = _even_rate(t) if np.all(np.diff(t) > 0) and _is_coarse(t) else None
     keys = {"from": name, "unit": unit}
     return _rising_clock(keys, t) if rate is None else (keys | {"every": rate[0]}, rate[1])
-
-
-def zone_questions(head: str, table: pd.DataFrame, clock: dict[str, Any]) -> Iterator[str]:
-    """Yield a question where dates without a zone are read as UTC, and the head of a log or its clock says another."""
-    if clock["unit"] != "date" or not isinstance(clock["from"], str):
-        return
-    text = str(column_called(table, clock["from"]).iloc[0]).strip()
-    if said := other_zone(head, clock["from"], text):
-        yield f"{said}: is it the time there? Then {ZONE_REMEDY}"
 
 
 def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:

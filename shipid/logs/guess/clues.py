@@ -170,8 +170,7 @@ class State:
     another. sides : letters that columns beside positions hold. negated : columns whose sign is turned.
     words : columns of words, with their first. other : columns that cannot be read, and why.
     commands : of the vessel, where it is known. turning : column that steers -> sign that turns the ship to starboard.
-    astern : whether the ship goes astern nearly always. changed : columns of the dataset with another unit or sign in a
-    part of the log.
+    astern : whether the ship goes astern nearly always.
     position, psi : north + i east [m], heading [rad]; from `choose_pose` on. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -195,7 +194,6 @@ class State:
     commands: tuple[str, ...] = ()
     turning: dict[str, float] = field(default_factory=dict)
     astern: bool = False
-    changed: set[str] = field(default_factory=set)
     position: Complex = field(init=False)
     psi: Array = field(init=False)
     r: Array | None = None

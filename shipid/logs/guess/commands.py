@@ -113,16 +113,18 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
     turned = _centre_angle(state, name, signal)
     unit = likely_unit(state, name, signal)
     extra: dict[str, Any] = {"wrap": True} if turned else {}
-    effect, seen = _turning_effect(state, r, name, sure)
+    effect = state.effect(r, state.columns[name])
     top = float(np.abs(state.columns[name]).max())
     astern = state.astern and signal == "delta"
     confidence = 0.5 if sure else 0.4
     why = "by its name; it is not seen to turn the ship, so that its sign is not known"
-    if effect:
+    seen = abs(effect) > SETTINGS.seen
+    if seen:
         effect = -effect if astern else effect
         state.turning[name] = float(np.sign(effect))
         sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
-        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} ({seen})"
+        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} (t value {abs(effect):.0f}"
+        why += ", the other way astern)" if state.astern else ")"
         if astern:
             words = f"the ship goes astern, and a rudder is taken to turn it the other way there: is {name!r}"
             state.ask((signal,), f"{words} positive to {sides[0]}?")
@@ -135,23 +137,13 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
         state.ask(("delta",), f"{words}, or which value is amidships (offset)?")
     if share or unsided:
         confidence, why = 0.3, f"by its name; up to {top:.4g}{share or ', and never negative'}"
-    if effect and not unsided and (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is one aft of the origin
+    if seen and not unsided and (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is one aft of the origin
         extra["sign"] = -1
     if signal == "alpha":
         _ask_for_half_turn(state, name, unit, int(extra.get("sign", 1)))
     side = state.side_of(name)
     component = (f"{side}_rudder" if signal == "delta" else side) if side else SIGNALS[signal].component
     state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
-
-
-def _turning_effect(state: State, r: Array, name: str, named: bool) -> tuple[float, str]:
-    """Effect of an order on the yaw rate, and how it is seen; 0 where it is not."""
-    effect = state.effect(r, state.columns[name])
-    if abs(effect) > SETTINGS.seen:
-        return effect, f"t value {abs(effect):.0f}" + ", the other way astern" * state.astern
-    span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
-    follows = evidence.order_correlation(state.t, r, state.columns[name], span) if named else 0.0
-    return (follows, f"correlation {abs(follows):.2f}") if abs(follows) > SETTINGS.followed else (0.0, "")
 
 
 def _centre_angle(state: State, name: str, signal: str) -> bool:
@@ -267,9 +259,9 @@ def _unit_of_shaft(
         state.ask(about, electrical if is_electrical(name) else share)
         return "rpm", 0.3, " of what the log does not say", {"factor": 1.0}
     in_radians = any(one.name == "psi" and one.unit == "rad" for one in state.suggestions)
-    prior = {"rpm": 0.0, "rev/s": 0.0, "rad/s": 1.0 if in_radians else SETTINGS.turned_axis}
+    prior = {"rpm": 0.0, "rev/s": 0.0, "rad/s": 1.0 if in_radians else SETTINGS.rare}
     off = {unit: np.log(_off_advance(state, state.columns[name], unit)) ** 2 for unit in prior}
-    cost = {unit: prior[unit] + one + SETTINGS.turned_axis * (written not in (None, unit)) for unit, one in off.items()}
+    cost = {unit: prior[unit] + one + SETTINGS.rare * (written not in (None, unit)) for unit, one in off.items()}
     unit = min(cost, key=cost.__getitem__)
     if written is not None:
         unit = written if tunnel or not np.isfinite(cost[unit]) else unit
@@ -282,11 +274,11 @@ def _unit_of_shaft(
     if state.ask_for_unit("n", name, unit):
         return unit, 0.3, " in a unit that is not known", {}
     shafts = [one.unit for one in state.suggestions if one.name.endswith(".n")]
-    if tunnel or not off[unit] < SETTINGS.near:
+    if tunnel or not off[unit] < SETTINGS.rare:
         unit = shafts[0] if tunnel and shafts else likely_unit(state, name, "n")
         state.ask(about, f"in which unit is {begins}? The way of the ship does not say: {unit} is a guess")
         return unit, 0.4, f"; in {unit} as the other shafts" * bool(tunnel and shafts), {}
-    rivals = [one for one in cost if one != unit and cost[one] < cost[unit] + SETTINGS.turned_axis * in_radians]
+    rivals = [one for one in cost if one != unit and cost[one] < cost[unit] + SETTINGS.rare * in_radians]
     rivals += ["per cent of a shaft speed"] * (top <= 130.0 and (unit == "rpm" or top > 50.0))
     if rivals:
         why = ", as angles are in rad here" * ("rad/s" in rivals)

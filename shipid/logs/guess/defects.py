@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -23,8 +24,6 @@ POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
-OFFSET, JITTER = 0.02, 0.07  # rad, share of the way: less is no finding
-OF_PATH = ("lever arm", "late position", "late velocity", "speed through water")
 SIGNALS_LATE = {
     "position": ("position", "velocity"),
     "velocity": ("velocity", "position"),
@@ -33,8 +32,6 @@ SIGNALS_LATE = {
 }
 """Signal of a diagnosis -> its name, and that of the signal that is late where it is early."""
 TURNED = np.radians(0.5)  # of a track against velocities, at least
-CLEAR = 0.008  # rad: standard error of a heading that is off, at most
-ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
 NO_PLACE, FAR_STEPS = 0.01, 20.0  # deg, and usual steps, by which rows about it are away from it, at least
 LOST = 0.5  # share of the rows without a fix, at most
@@ -81,10 +78,8 @@ def defects_of_motion(state: State) -> None:
     course = _ask_if_course(state)
     if state.velocity is None or state.body is None:
         _report_position_jumps(state, _own_path(state))
-        _report_heading_offset(state)
         return
     _report_position_jumps(state, _report_causes(state, () if course else ("psi", "r")))
-    _report_heading_offset(state)
 
 
 def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
@@ -123,14 +118,6 @@ def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
             sentence = f"{late} comes {abs(size[0]):.2g} s later than the {other} says"
             _find_cause(state, f"late {late}", sentence, found, repair)
         found = found.next
-    if not state.changed & {"u", "speed"} and not any(one.kind in OF_PATH for one in state.findings):
-        seen, ran = state.chosen.change(state.position), state.chosen.change(path)
-        keep = evidence.windows_without_outliers(seen, ran)
-        fit = evidence.fit_scale(seen[keep], ran[keep])
-        if float(np.sqrt(fit.left)) > JITTER:
-            far = float(np.sqrt(np.mean(np.abs(seen[keep] - fit.scale * ran[keep]) ** 2)))
-            words = f"over {evidence.WINDOW:g} s positions leave integrated velocities by {far:.2g} m (RMS)"
-            state.find("position jitter", (), 0.8, f"{words}: take the path of the velocities")
     return path
 
 
@@ -216,13 +203,6 @@ def _value_step(values: Array) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _jackknife_error(design: Array, values: Array, rows: NDArray[np.intp]) -> float:
-    """Standard error of the first coefficient of a fit to some rows: the scatter without each of ten parts of them."""
-    others = [np.setdiff1d(rows, part) for part in np.array_split(rows, 10)]
-    without = [np.linalg.lstsq(design[kept], values[kept], rcond=None)[0][0] for kept in others]
-    return float(np.std(without) * np.sqrt(len(without) - 1))
-
-
 def _own_path(state: State) -> Complex:
     """Path (N,) [m] by the medians of the steps of the position about each row, where no velocities are logged."""
     steps = pd.Series(np.diff(state.t))
@@ -245,20 +225,30 @@ def _report_position_jumps(state: State, path: Complex) -> None:
         if not any(unit * start <= place[1] and place[0] <= unit * end for start, end in lost)
     ]
     stay = [place for place in places if place[2] > 5.0]
-    if stay and state.joined:
-        count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
-        state.find(
-            "position jumps",
-            (),
-            0.9,
-            f"the position jumps {count} of the files and does not come back: `data check` shows where",
-        )
-    elif stay:
-        words = ", ".join(
-            f"{clock_text(state, start)} to {clock_text(state, end)} ({far:.0f} m)" for start, end, far in stay[:6]
-        )
-        repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
-        state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
+    if stay:
+        words = "the position jumps and does not come back"
+        report_breaks(state, "position jumps", (), words, stay, "m")
+
+
+def report_breaks(
+    state: State, kind: str, columns: tuple[str, ...], words: str, places: list[tuple[float, float, float]], unit: str
+) -> None:
+    """Report stretches (start [s], end [s], size) that are wrong; the repair breaks the run there.
+
+    Rows of several files have no clock in common, and no repair.
+    """
+    spans = [f"{clock_text(state, a)} to {clock_text(state, b)} ({size:.0f} {unit})" for a, b, size in places]
+    first = ", ".join(spans[:FEW]) + f" and {len(spans) - FEW} more" * (len(spans) > FEW)
+    where = f"in {len(places)} stretches of the files: `data check` shows where" if state.joined else first
+    state.find(kind, columns, 0.9, f"{words}: {where}", break_repair(state, [place[:2] for place in places]))
+
+
+def break_repair(state: State, spans: Iterable[tuple[float, float]]) -> dict[str, Any] | None:
+    """The repair that breaks a run in stretches (start, end) [s]; none where the rows are of several files."""
+    unit = to_si(state.clock_unit, "t")
+    return (
+        None if state.joined else {"kind": "break", "intervals": [[start / unit, end / unit] for start, end in spans]}
+    )
 
 
 def clock_text(state: State, t: float) -> str:
@@ -266,48 +256,12 @@ def clock_text(state: State, t: float) -> str:
     return format_date(t) if FIRST_DATED_TIME < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
-def _report_heading_offset(state: State) -> None:
-    angle, error, current = _off_on_all_courses(state)
-    if error < CLEAR and np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # of more it is a drift, or another zero
-        why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
-        why += f", beside a steady current of {abs(current):.2g} m/s: heading off, positions in turned axes, or wind"
-        repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
-        state.find("heading offset", ("psi",), 0.6, why, repair)
-
-
-def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
-    """How far the heading is off [rad], its standard error, and a steady current, north + i east [m/s].
-
-    Over each window: way across the heading = tan(off) * (way along it) + arm * (turn) + (current across).
-    """
-    span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    psi = state.chosen.change(evidence.integrate_rate(state.t, state.psi)).real / span
-    north = np.exp(-1j * psi)
-    if state.body is None:
-        ran = state.chosen.change(state.position) / span * north
-    else:
-        ran = state.chosen.change(evidence.integrate_rate(state.t, state.body)) / span
-    ran = -ran if state.astern else ran
-    columns = (ran.real, state.chosen.change(state.psi).real / span, north.imag, north.real)
-    design = np.stack(columns, axis=1)
-    keep = np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90)
-    for _ in range(2):
-        if keep.sum() < 40 or abs(complex(np.mean(north[keep]))) > ONE_WAY:  # across one course a current is no less
-            return 0.0, np.inf, 0j
-        found = np.linalg.lstsq(design[keep], ran.imag[keep], rcond=None)[0]
-        miss = np.abs(ran.imag - design @ found)
-        keep &= miss <= 6.0 * np.median(miss[keep]) + 1e-9
-    error = _jackknife_error(design, ran.imag, np.flatnonzero(keep))
-    off = float(np.arctan(found[0]))
-    return off, error, complex(found[2], found[3]) * np.cos(off) * np.exp(1j * off)
-
-
-def _row_times(state: State, rows: NDArray[np.intp]) -> str:
-    count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
-    if state.joined:
-        return f"in {count} of the files"
-    words = ", ".join(clock_text(state, float(state.t[row])) for row in rows[:FEW])
-    return f"near {words}" if len(rows) <= FEW else f"in {count}, the first near {words}"
+def places_in_words(state: State, t: Array, spans: NDArray[np.intp]) -> str:
+    """Where the rows of spans (K, 2), first and end, at t (N,) [s] are: their number, and the first few times."""
+    count, several = int(np.sum(spans[:, 1] - spans[:, 0])), len(spans) > 1
+    words = f"in {count} row{'s' * (count > 1)} at {len(spans)} place{'s' * several}"
+    times = ", ".join(clock_text(state, float(t[first])) for first, _ in spans[:FEW])
+    return f"{words} of the files" if state.joined else f"{words}, {'the first ' * (len(spans) > FEW)}near {times}"
 
 
 def take_lost_fixes(state: State) -> None:
@@ -326,15 +280,14 @@ def _take_out(
     state: State, name: str, rows: NDArray[np.bool_], kind: str, fills: str, why: str, about: tuple[str, ...]
 ) -> None:
     """Interpolate rows (N,) of a column that hold no value, and report them; the repair breaks the run there."""
-    t, unit, step = state.t, to_si(state.clock_unit, "t"), float(np.median(np.diff(state.t)))
+    t, step = state.t, float(np.median(np.diff(state.t)))
     spans = evidence.row_spans(rows)
     state.columns[name] = np.interp(t, t[~rows], state.columns[name][~rows])
-    sentence = f"{name!r} is {fills} {_row_times(state, spans[:, 0])}: {why}"
+    sentence = f"{name!r} is {fills} {places_in_words(state, t, spans)}: {why}"
     if state.joined:
         state.ask(about, f"{sentence}. Leave these cells empty, and draft again")
     around = np.concatenate([[t[0] - step], t, [t[-1] + step]])
-    breaks = [[around[first] / unit, around[end + 1] / unit] for first, end in spans]
-    state.find(kind, (name,), 0.95, sentence, None if state.joined else {"kind": "break", "intervals": breaks})
+    state.find(kind, (name,), 0.95, sentence, break_repair(state, [(around[a], around[b + 1]) for a, b in spans]))
 
 
 def lost_fixes(values: Array) -> NDArray[np.bool_]:
@@ -396,20 +349,22 @@ def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[
 
 def defects_of_spikes(state: State) -> None:
     """Report spikes of what was measured, with the repair; an order that is given for a moment is none."""
-    step = float(np.median(np.diff(state.t)))
-    places = [one for one in state.suggestions if one.name in POSITIONS and one.source in state.spikes]
+    step, rows = float(np.median(np.diff(state.t))), np.arange(len(state.t))
+    places = [
+        state.spikes[one.source][0] for one in state.suggestions if one.name in POSITIONS if one.source in state.spikes
+    ]
     if places:
-        rows = np.unique(np.concatenate([state.spikes[one.source][0] for one in places]))
-        state.find(
-            "position spikes", (), 0.9, f"the position leaves and comes back {_row_times(state, rows)}", OF_POSITIONS
-        )
+        where = places_in_words(state, state.t, evidence.row_spans(np.isin(rows, np.concatenate(places))))
+        state.find("position spikes", (), 0.9, f"the position leaves and comes back {where}", OF_POSITIONS)
     for one in state.suggestions:
         if one.name in SPIKY and one.source in state.spikes:
-            rows, size = state.spikes[one.source]
-            threshold = float(f"{size / 2:.2g}")
-            least = f"{size:.3g} {one.unit}{' or more' * (len(rows) > 1)}"
-            sentence = f"{one.source!r} leaves its course by {least} and comes back {_row_times(state, rows)}"
-            longest = max(len(run) for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1))
-            width = max(5, 2 * longest + 3) * step
+            wild, size = state.spikes[one.source]
+            spans = evidence.row_spans(np.isin(rows, wild))
+            least = f"{size:.3g} {one.unit}{' or more' * (len(wild) > 1)}"
+            sentence = (
+                f"{one.source!r} leaves its course by {least} and comes back {places_in_words(state, state.t, spans)}"
+            )
+            width = max(5, 2 * int(np.max(spans[:, 1] - spans[:, 0])) + 3) * step
             repair = {"kind": "despike", "columns": [one.name], "window": round(max(width, 1e-3), 3)}
+            threshold = float(f"{size / 2:.2g}")
             state.find("spikes", (one.source,), 0.9, sentence, repair | {"threshold": threshold, "unit": one.unit})

@@ -164,20 +164,6 @@ def _yaw_regression(t: Array, r: Array, orders: Array, duration: float) -> tuple
     return design[tame], change[tame]
 
 
-def order_correlation(t: Array, r: Array, order: Array, duration: float) -> float:
-    """The uncentred correlation of the yaw rate with an order at most `duration` [s] before, where it is largest."""
-    usual = float(np.median(np.diff(t)))
-    width = max(1, round(duration / 4 / usual))
-    smooth_r, smooth_order = (_moving_mean(values - np.median(values), width) for values in (r, order))
-    best = 0.0
-    for rows in np.unique(np.linspace(0, max(1, round(duration / usual)), 9).astype(int)):
-        a, b = smooth_r[rows:], smooth_order[: len(order) - rows]
-        size = float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
-        now = float(np.sum(a * b)) / size if size > 0 else 0.0
-        best = now if abs(now) > abs(best) else best
-    return best
-
-
 def _moving_mean(values: Array, width: int, stretch: NDArray[np.int_] | None = None) -> Array:
     """The centred mean over `width` rows, of fewer at the ends of the log, or of each stretch (N,), (N,)."""
     series = pd.Series(values)

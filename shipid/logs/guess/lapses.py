@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from shipid.data.dataset import Array
-from shipid.data.lapses import CommandFault, find_command_faults
+from shipid.data.lapses import find_command_faults
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.defects import FEW, clock_text
+from shipid.logs.guess.defects import break_repair, places_in_words
 from shipid.logs.guess.evidence import GAP
 from shipid.logs.guess.sniff import LogTable
 from shipid.logs.mapping import to_si
@@ -47,23 +44,10 @@ def report_command_faults(state: State, sniffed: LogTable) -> None:
             some = [fault for fault in found if fault.kind == kind]
             if not some:
                 continue
-            sentence = f"{one.source!r} {words.format(_fault_places(state, some, t))}"
+            spans = np.array([[fault.first, fault.end] for fault in some])
+            sentence = f"{one.source!r} {words.format(places_in_words(state, t, spans))}"
             if state.joined or sure == UNSURE:
                 remedy = "leave these cells empty, and draft again" if state.joined else "switch the repair on"
                 state.ask((one.name,), f"{sentence} Unless it was ordered, {remedy}")
-            state.find(title, (one.source,), sure, sentence, None if state.joined else _break_repair(state, some, t))
-
-
-def _fault_places(state: State, some: list[CommandFault], t: Array) -> str:
-    count = sum(fault.end - fault.first for fault in some)
-    words = f"in {count} row{'s' * (count > 1)} at {len(some)} place{'s' * (len(some) > 1)}"
-    if state.joined:
-        return f"{words} of the files"
-    times = ", ".join(clock_text(state, float(t[fault.first])) for fault in some[:FEW])
-    return f"{words}, {'the first ' * (len(some) > FEW)}near {times},"
-
-
-def _break_repair(state: State, found: list[CommandFault], t: Array) -> dict[str, Any]:
-    unit, last = to_si(state.clock_unit, "t"), len(t) - 1
-    intervals = [[t[max(one.first - 1, 0)] / unit, t[min(one.end, last)] / unit] for one in found]
-    return {"kind": "break", "intervals": intervals}
+            repair = break_repair(state, [(t[max(a - 1, 0)], t[min(b, len(t) - 1)]) for a, b in spans])
+            state.find(title, (one.source,), sure, sentence, repair)

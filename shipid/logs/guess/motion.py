@@ -51,6 +51,7 @@ def choose_motion(state: State, file: Path, frame: Frame | None = None) -> None:
     if best.velocity is not None:
         _take_velocities(state, best, best.velocity)
     _take_rate(state, best)
+    _ask_about_axes(state, best)
 
 
 # --- position and heading ---
@@ -101,7 +102,6 @@ def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], se
     """Note axes and a heading that count otherwise than usual, and ask where another reading is nearly as likely."""
     pose, axes = best.pose, best.axes
     agreement = 1.0 - pose.misfit
-    words = _reading_in_words(best, axes)
     if pose.astern:
         state.astern = True
         said = "course and heading differ by about 180 deg: the ship goes astern, as shafts or velocities say"
@@ -111,17 +111,31 @@ def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], se
         state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {said}")
     if (axes != Axes() or sense != Sense()) and not best.settled.startswith("--"):
         shown = f", as {best.settled!r} shows" if best.settled else ""
-        state.find("frame", (*sources, pose.heading), agreement, f"course and heading agree with {words}{shown}")
-    if pose.place.on_globe and axes != Axes():
-        said = " and ".join(f"{name!r} to {way}" for name, way in zip(sources, _ways(axes), strict=True))
-        state.ask(
-            ("latitude", "longitude", "psi"), f"does the log count {said}? Else {pose.heading!r} counts otherwise"
-        )
-    elif best.rivals:
-        sides = "; port and starboard change places" * any(axes.hand != one.hand for one in best.rivals)
-        said = ", or ".join([f"is {words}", *(_reading_in_words(best, one) for one in best.rivals)])
+        words = f"course and heading agree with {_reading_in_words(best, axes)}{shown}"
+        state.find("frame", (*sources, pose.heading), agreement, words)
+
+
+def _ask_about_axes(state: State, best: MotionReading) -> None:
+    """Ask where other axes are nearly as likely, and name all that turns with them."""
+    place, axes = best.pose.place, best.axes
+    rivals = (Axes(),) * (axes != Axes()) if place.on_globe else best.rivals
+    if not rivals:
+        return
+    mirror = any(axes.hand != one.hand for one in rivals)
+    turned = [one for one in state.suggestions if one.source not in (place.first, place.second, best.pose.heading)]
+    turned = [one for one in turned if one.name == "course" or "frame" in one.extra or (mirror and one.name in "vr")]
+    about = (*(one.name for one in turned), *("delta", "alpha") * mirror)
+    also = ", ".join([*(repr(one.source) for one in turned), *["all that steers"] * mirror])
+    sides = "; port and starboard change places" * mirror + f"; with it turn {also}" * bool(also)
+    if place.on_globe:
+        ways = zip((place.first, place.second), _ways(axes), strict=True)
+        said = " and ".join(f"{name!r} to {way}" for name, way in ways)
+        words = f"does the log count {said}? Else {best.pose.heading!r} counts otherwise{sides}"
+        state.ask(("latitude", "longitude", "psi", *about), words)
+    else:
+        said = ", or ".join([f"is {_reading_in_words(best, axes)}", *(_reading_in_words(best, one) for one in rivals)])
         words = f"{said}? The motion is the same in all{sides}: answer with --frame ned, enu, zup or ros"
-        state.ask(("psi", "north", "east"), words)
+        state.ask(("psi", "north", "east", *about), words)
 
 
 def _ways(axes: Axes) -> list[str]:
@@ -250,9 +264,9 @@ def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool
     for unit, factor in UNITS["m/s"].items():
         for part in (1.0, *KNOTS) if unit == "kn" and whole else (1.0,):
             for clock, times in clocks.items():
-                usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.rare_unit
-                cost = (0.0 if written == unit else SETTINGS.rare_unit + 2.0) if written else usual
-                cost += SETTINGS.usual_unit * (part != 1.0) + SETTINGS.other_clock * (times != 1.0)
+                usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.odd
+                cost = (0.0 if written == unit else SETTINGS.odd + 2.0) if written else usual
+                cost += SETTINGS.usual_unit * (part != 1.0) + SETTINGS.odd * (times != 1.0)
                 off = np.log(fit.scale / (factor * part * times)) / (SETTINGS.off_unit if times == 1.0 else 0.02)
                 costs[unit, part, clock] = float(cost + off**2 / 2)
     ranked = sorted(costs, key=costs.__getitem__)

@@ -191,7 +191,7 @@ def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[
     if not poses or (poses[0].misfit > SETTINGS.poor and not (places and headings)):
         raise DataError(_what_is_missing(state, bool(places)), file=file)
     kept = [one for one in poses if one.cost < poses[0].cost + 6.0][: SETTINGS.beam]
-    kept += [_as_astern(state, one) for one in kept if one.misfit < SETTINGS.unseen]
+    kept += [_as_astern(state, one) for one in kept if one.misfit < SETTINGS.named_left]
     motions = [motion for pose in kept if (motion := _motion_of_pose(state, pose, frame)) is not None]
     if not motions:
         best = poses[0]
@@ -210,7 +210,7 @@ def _named_places(state: State) -> Iterator[Place]:
         for north, east in product(state.called(first), state.called(second)):
             named = (meaning_scores(north).get(first, 0.0) + meaning_scores(east).get(second, 0.0)) / 2
             cost = -np.log(SETTINGS.unnamed + named)
-            for a, b, more in ((north, east, 0.0), (east, north, SETTINGS.axis + 1.0)):
+            for a, b, more in ((north, east, 0.0), (east, north, SETTINGS.odd + 1.0)):
                 if a != b and (a == north if not on_globe else _within_globe(state, a, b)):
                     yield Place(a, b, on_globe, float(cost + more))
 
@@ -323,10 +323,10 @@ def _turns_of_angle(state: State, name: str) -> Iterator[tuple[float, float]]:
     jumps = turn_of_jumps(values)
     for turn in (360.0, 2 * np.pi, *TURNS):
         usual = turn in (360.0, 2 * np.pi)
-        cost = SETTINGS.usual_unit * (turn != 360.0) if usual else SETTINGS.rare_unit
+        cost = SETTINGS.usual_unit * (turn != 360.0) if usual else SETTINGS.odd
         if jumps is not None or written is not None:
             named = written is not None and to_si(written, "psi") * turn == 2 * np.pi
-            cost = 0.0 if named or turn == jumps else SETTINGS.rare_unit
+            cost = 0.0 if named or turn == jumps else SETTINGS.odd
         if usual or (jumps == turn) or (written is None and 360.5 < values.max() <= turn and values.min() >= 0.0):
             yield turn, cost
 
@@ -345,7 +345,7 @@ def _as_astern(state: State, pose: Pose) -> Pose:
     shafts = [state.columns[name][state.columns[name] != 0.0] for name in state.called("n")]
     back = any(len(one) and np.mean(one < 0.0) > SETTINGS.astern for one in shafts)
     sense = Sense(pose.sense.sign, (pose.sense.quarter + 3) % 4 - 1)
-    return replace(pose, sense=sense, astern=True, cost=pose.cost + (1.0 if back else SETTINGS.compass + 1.0))
+    return replace(pose, sense=sense, astern=True, cost=pose.cost + (1.0 if back else SETTINGS.rare))
 
 
 def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> MotionReading | None:
@@ -369,7 +369,7 @@ def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> MotionReadin
         for velocity, rate in product([*velocities, None], [*rates, None])
         if velocity is None or rate is None or rate.name not in (velocity.first, velocity.second)
     ]
-    velocity, rate = min(pairs, key=lambda pair: sum(one.cost if one else SETTINGS.none for one in pair))
+    velocity, rate = min(pairs, key=lambda pair: sum(one.cost if one else SETTINGS.odd for one in pair))
     readings = sorted(_readings(state, pose, seen, frame), key=lambda one: one[0])
     if not readings:
         return None
@@ -418,7 +418,7 @@ def _sense_cost(sense: Sense, compass: bool, local: bool) -> float:
     if sense == Sense():
         return 0.0
     usual = sense in (Sense(-1, 1), Sense(-1))
-    return 0.7 if usual and (local or not compass) else SETTINGS.compass if compass else SETTINGS.axis
+    return 0.7 if usual and (local or not compass) else SETTINGS.rare if compass else SETTINGS.odd
 
 
 def _axis_cost(name: str, way: str, sign: int) -> float:
@@ -426,7 +426,7 @@ def _axis_cost(name: str, way: str, sign: int) -> float:
     said = {other: meaning_scores(name).get(other, 0.0) for other in ("north", "east")}
     if _is_letter_axis(name) or max(said.values()) <= 0.9:
         return 0.3 * (way != ("east" if "y" in name.lower() else "north")) + 0.3 * (sign < 0)
-    return SETTINGS.axis / 2 * (said[way] < 0.6) + SETTINGS.turned_axis * (sign < 0)
+    return SETTINGS.odd / 2 * (said[way] < 0.6) + SETTINGS.rare * (sign < 0)
 
 
 def _side_cost(state: State, name: str, sign: int) -> float:
@@ -434,7 +434,7 @@ def _side_cost(state: State, name: str, sign: int) -> float:
     if OTHER_WAY & {*name_parts(name)}:
         return 0.5 * (sign > 0)
     unsigned = state.columns[name].min() >= 0 or name in state.negated
-    return (0.6 * SETTINGS.axis if unsigned else SETTINGS.turned_axis) * (sign < 0)
+    return (0.6 * SETTINGS.odd if unsigned else SETTINGS.rare) * (sign < 0)
 
 
 def _course_axes(state: State, pose: Pose, seen: Complex) -> Iterator[tuple[str, Axes]]:
@@ -554,7 +554,7 @@ def _speeds_and_courses(state: State, pose: Pose, seen: Complex, theta: Array) -
             angle = _angle(state, name, turn)
             way = np.exp(1j * angle)
             misfit, sense = senses_of_angle(seen, way[middle])[0]
-            if misfit > SETTINGS.unseen:
+            if misfit > SETTINGS.named_left:
                 continue
             plane = np.exp(1j * sense.direction(angle))
             for speed in speeds:
@@ -605,7 +605,7 @@ def _window_means(state: State, values: Array) -> Array:
 
 def _is_speed_unit(scale: float) -> bool:
     away = {unit: abs(scale / factor - 1) for unit, factor in UNITS["m/s"].items()}
-    return any(off < (0.15 if unit in PLAIN else SETTINGS.off_rare) for unit, off in away.items())
+    return any(off < (0.15 if unit in PLAIN else SETTINGS.off_unit) for unit, off in away.items())
 
 
 def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
@@ -633,8 +633,8 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
             off = abs(scale / UNITS["rad/s"][unit] - 1)
             score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
             command = meaning_scores(name).keys() & rows_of_role("command").keys()
-            limit = SETTINGS.named_left if score else SETTINGS.misled if command or is_order(name) else 0.3
-            if fit.left < limit and off < (0.35 if score else SETTINGS.misled if name in others else 0.35):
+            limit = SETTINGS.named_left if score else SETTINGS.left if command or is_order(name) else 0.3
+            if fit.left < limit and off < (0.35 if score else SETTINGS.left if name in others else 0.35):
                 cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off
                 yield Rate(name, unit, fit, float(cost))
 

@@ -26,7 +26,6 @@ from shipid.logs.guess.clock import (
     doubts_on,
     is_clock,
     other_clocks,
-    zone_questions,
 )
 from shipid.logs.guess.layout import format_of_sheet, guess_format
 from shipid.logs.guess.words import NO_VALUE, is_run, meaning_scores, name_parts, units_in_name
@@ -204,8 +203,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     kept = {name: values for name, values in kept.items() if name not in runs}
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     doubts = tuple(doubts_on(table.loc[once], clock, t))
-    above = "\n".join(lines.splitlines()[: model.skip_rows]) if isinstance(model, TableFormat) else ""
-    doubts += tuple(zone_questions(above, table, clock))
     doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(other_clocks(table.loc[once], columns, clock, t))
     return LogTable(

@@ -8,9 +8,8 @@ import numpy as np
 
 from shipid.data.dataset import Array
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.defects import FEW, clock_text
+from shipid.logs.guess.defects import report_breaks
 from shipid.logs.guess.evidence import GAP, integrate_rate
-from shipid.logs.mapping import to_si
 
 LEAST_ROWS, LEAST, LONG = 5, 4.5, 4.0  # rows; s; times as long as nearly all other repetitions
 TURNED = np.radians(6.0)  # by which the ship turns meanwhile
@@ -18,8 +17,7 @@ TURNED = np.radians(6.0)  # by which the ship turns meanwhile
 
 def find_stuck(state: State) -> None:
     """Report a heading, yaw rate or course that stands still while the ship turns, with a break as the repair."""
-    t, unit = state.t, to_si(state.clock_unit, "t")
-    still = np.zeros(len(t))
+    t, still = state.t, np.zeros(len(state.t))
     ran = still if state.r is None else integrate_rate(t, state.r).real
     for one in state.suggestions:
         if one.name not in ("psi", "r", "course"):
@@ -32,14 +30,8 @@ def find_stuck(state: State) -> None:
             if abs(turn) > TURNED:  # a jump that follows may be taken for one across 360
                 places.append((float(t[first]), float(t[min(last + 2, len(t) - 1)]), np.degrees(turn)))
         if places:
-            spans = [
-                f"{clock_text(state, a)} to {clock_text(state, b)} ({turn:.0f} deg)" for a, b, turn in places[:FEW]
-            ]
-            where = f"at {len(places)} places of the files" if state.joined else f"from {', '.join(spans)}"
-            sentence = f"{one.source!r} repeats one value while the ship turns, {where}"
-            intervals = [[start / unit, end / unit] for start, end, _ in places]
-            repair = None if state.joined else {"kind": "break", "intervals": intervals}
-            state.find("frozen sensor", (one.source,), 0.9, sentence, repair)
+            words = f"{one.source!r} repeats one value while the ship turns"
+            report_breaks(state, "frozen sensor", (one.source,), words, places, "deg")
 
 
 def _held_stretches(t: Array, values: Array) -> Iterator[tuple[int, int]]:

@@ -337,28 +337,6 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
 
 
 @pytest.mark.parametrize(
-    ("head", "clock", "behind", "said"),
-    [
-        ("# tz=+01:00\n# vessel 7\n", "time", "", "tz=+01:00"),
-        ("Time zone: Europe/Oslo\n", "time", "", "Time zone: Europe/Oslo"),
-        ("all times are local time\n", "time", "", "local time"),
-        ("", "time (UTC+2)", "", "UTC+2"),
-        ("", "Zeit [MESZ]", "", "MESZ"),
-        ("", "heure locale", "", "heure locale"),
-        ("# tz=+01:00\n", "time", "+01:00", ""),
-        ("# tz=+00:00\n", "time", "", ""),
-        ("Time zone: UTC\n", "time (UTC)", "", ""),
-        ("est. speed in a local frame, 12-05-2024\n", "time", "", ""),
-    ],
-)
-def test_a_zone_that_only_the_head_says_is_asked(head: str, clock: str, behind: str, said: str, tmp_path: Path) -> None:
-    """Before, the times were counted as UTC without a word."""
-    rows = [f"2024-05-14 08:00:{k:02d}{behind},{k % 7},{k % 5}" for k in range(60)]
-    doubts = recognise_log(log_of(tmp_path, [*head.splitlines(), f"{clock},x,y", *rows])).doubts
-    assert [f"is read as UTC, and the log says {said!r}" in doubt for doubt in doubts] == [True] * bool(said)
-
-
-@pytest.mark.parametrize(
     ("names", "unit", "rest"),
     [
         (("header.stamp.secs", "header.stamp.nsecs"), "s + ns", 1e-9),

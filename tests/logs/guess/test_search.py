@@ -74,7 +74,7 @@ def test_columns_without_names() -> None:
     """A mirror image fits as well, which is asked; a signal that is no motion is not taken."""
     state = chosen({"2": np.sin(T / 7), "3": DEG, "4": NORTH, "5": EAST})
     assert sources(state) == {"north": "4", "east": "5", "psi": "3"}
-    assert [question.about for question in state.questions] == [("psi", "north", "east")]
+    assert [question.about for question in state.questions] == [("psi", "north", "east", "delta", "alpha")]
     assert_motion(state)
 
 
@@ -227,9 +227,14 @@ def test_a_ship_that_goes_astern_all_the_time_keeps_her_heading(
 def test_the_true_frame_is_among_those_that_are_asked(
     x: np.ndarray, y: np.ndarray, yaw: np.ndarray, reading: str, name: str
 ) -> None:
-    """The motion is the same in all of them, in which port and starboard change places."""
-    (question,) = chosen({"x": x, "y": y, name: yaw % 360.0}).questions
-    assert reading.format(name) in question.sentence
+    """The motion is the same in all of them; port and starboard change places, and all that says them is named."""
+    log = si_log()
+    speed, drift = np.hypot(log["u"], log["v"]).to_numpy(), np.degrees(np.arctan2(log["v"], log["u"])).to_numpy()
+    turns = {"cog": (yaw + drift) % 360.0, "rate of turn": np.degrees(log["r"].to_numpy())}
+    questions = chosen({"x": x, "y": y, name: yaw % 360.0, "sog": speed, **turns}).questions
+    (question,) = [one for one in questions if "north" in one.about and reading.format(name) in one.sentence]
+    assert {"psi", "north", "east", "course", "r", "delta", "alpha"} <= {*question.about}
+    assert "with it turn 'cog', 'rate of turn', all that steers" in question.sentence
 
 
 @pytest.mark.parametrize("share", [0.0, 0.9, 1.2])
