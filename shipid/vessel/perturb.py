@@ -314,13 +314,14 @@ SOURCES = ("base", "predictions", "function", "fmu")
 def resolve_families(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:
     """Families with `extends` written out; unknown or circular ones, and missing bases, raise DocumentError."""
     by_name: dict[str, Family] = {}
+    places: dict[str, int] = {}
     for index, family in enumerate(families):
         if family.name in by_name:
             raise DocumentError(f"two families are called {family.name!r}", file=file, path=f"family.{index}.name")
-        by_name[family.name] = family
+        by_name[family.name], places[family.name] = family, index
 
     def written_out(family: Family, above: tuple[str, ...]) -> Family:
-        where = f"family.{list(by_name).index(family.name)}"
+        where = f"family.{places[family.name]}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
         parent = Family(name="empty")
