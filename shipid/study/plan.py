@@ -560,13 +560,13 @@ def check_ranges(document: Document) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
     meant = document.get(UNUSUAL, [])
     for path, value in documents.document_leaves(document):
-        if not isinstance(value, int | float) or isinstance(value, bool):
-            continue
-        limits = next((row for pattern, row in RANGES.items() if documents.match_paths(pattern, [path])), None)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        limits = next(
+            (row for pattern, row in RANGES.items() if number and documents.match_paths(pattern, [path])), None
+        )
         if limits is None or limits[0] <= value <= limits[1]:
             continue
         named = documents.path_with_names(document, path)
         if not any(documents.match_paths(str(one), [path, named]) for one in meant):
-            message = "{:g}: expected {:g} to {:g} {}".format(value, *limits)
             remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
-            raise DocumentError(f"{message}; {remedy}", path=path)
+            raise DocumentError(f"{value:g}: expected {limits[0]:g} to {limits[1]:g} {limits[2]}; {remedy}", path=path)

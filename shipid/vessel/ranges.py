@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 from shipid import document as documents
@@ -181,7 +180,6 @@ def _rudder_contradictions(
         yield f"thruster.{name}.behind", f"{screw!r} at y = {y_of:g} m is on the other side: this is at y = {y:g} m"
 
 
-@lru_cache(maxsize=10_000)
 def _range_of(path: str, unit: str) -> MagnitudeRange | None:
     by_unit = _ADDED if path.startswith("added_mass.") else _BY_UNIT
     return _NAMED.get(path) or _BY_NAME.get(path.rpartition(".")[2]) or by_unit.get(unit)
