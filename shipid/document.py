@@ -11,6 +11,7 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
 
@@ -284,9 +285,12 @@ def plain_values(value: Any) -> Any:
 
 def match_paths(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     """Paths that match a pattern; `*` matches any characters, also dots."""
-    literal = pattern.replace("[", "[[]").replace("?", "[?]")
-    expression = re.compile(fnmatch.translate(literal))
-    return [path for path in paths if expression.match(path)]
+    return [path for path in paths if _path_expression(pattern).match(path)]
+
+
+@lru_cache(maxsize=1000)
+def _path_expression(pattern: str) -> re.Pattern[str]:
+    return re.compile(fnmatch.translate(pattern.replace("[", "[[]").replace("?", "[?]")))
 
 
 def parse_model(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:

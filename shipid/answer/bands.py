@@ -33,8 +33,9 @@ def cell_regions(
         bands = results.bands.get(row["cell"])
         if bands is not None and any(bands.promises(level) for level in levels):
             paths, test = results.paths[row["cell"]], results.test
-            kept = filter(bands.promises, levels)
-            by_level = {level: bands.region(paths, test.columns, test.step, level, past=test.past) for level in kept}
+            kept, given = filter(bands.promises, levels), (paths, test.columns, test.step)
+            size = bands.growth(*given, test.past)
+            by_level = {level: bands.region(*given, level, size=size) for level in kept}
             yield row, by_level, test.future - paths
 
 

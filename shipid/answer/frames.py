@@ -68,14 +68,15 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     Of physics, cooperative models and constant u, v, r; x and y are those of the frame (11).
     """
     true, test = results.test.future, results.test
-    ahead, parts = test.step * np.arange(1, test.horizon + 1), []
+    ahead, curves, parts = test.step * np.arange(1, test.horizon + 1), [], []
     naive = {"model": "naive", "N_D": 0, "seed": 0, "source": "naive"}, constant_motion(test)
     for keys, path in (naive, *_figure_paths(results)):
         error, (along, across) = position_error(path, true), np.abs(path - true).mean(axis=1).T
-        errors = {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1), "along": along, "across": across}
         course = np.degrees(course_over_horizon(path, true, test.step))
-        parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors, "course": course}))
-    return pd.concat(parts, ignore_index=True)
+        parts.append([ahead, error.mean(axis=1), np.quantile(error, 0.9, axis=1), along, across, course])
+        curves += [keys] * len(ahead)
+    names = ["ahead", "mean", "p90", "along", "across", "course"]
+    return pd.DataFrame(curves).assign(**dict(zip(names, np.concatenate(parts, axis=1), strict=True)))
 
 
 def time_frame(results: Results) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from shipid.files import read_json, write_json, write_table, write_text
 from shipid.metrics import summarise_errors
 from shipid.report import AnswerSentence, ReportContent, summary_text, write_report
 from shipid.report.methods import MethodsContent, sentences_on_methods, write_comparison
-from shipid.study import store
+from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
 from shipid.study.envelope import envelope_table
 from shipid.study.lock import PAGES, sole_writer
@@ -98,7 +98,8 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
 def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
     """Write the pages of one run."""
     results = read_results(folder, say)
-    store.write_results(folder, results.plan, results.cells, whole=results.complete)
+    if not seals.is_sealed(folder, store.RESULTS):
+        store.write_results(folder, results.plan, results.cells, whole=results.complete)
     if say is not None:
         say(f"{results.plan.name}: answer, findings and tables of {len(results.cells)} cells")
     content = report_content(results)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import errno
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from copy import copy
+from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.models import CommandInfo
 
 import shipid
 from shipid.cli import data, expect, family, identify, predict, simulation, study, vessel
@@ -50,7 +53,7 @@ def main() -> None:
             if not is_utf_8(argument):
                 raise ShipidError("is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8", path=argument)
         sys.argv[1:] = _move_to_front(sys.argv[1:])
-        app()
+        _with_named_commands(app, sys.argv[1:])()
     except BrokenPipeError:
         sys.exit(141)
     except KeyboardInterrupt:
@@ -66,6 +69,19 @@ def main() -> None:
             raise
         sys.stderr.write(f"error: {line}\n")
         sys.exit(1)
+
+
+def _with_named_commands(every: typer.Typer, words: Collection[str]) -> typer.Typer:
+    """The same commands; of those that no word names only name and help: their parameters took half of the start."""
+    narrow = copy(every)
+    narrow.registered_commands = [
+        one if one.name in words else CommandInfo(one.name, help=getdoc(one.callback), callback=lambda: None)
+        for one in every.registered_commands
+    ]
+    narrow.registered_groups = [copy(one) for one in every.registered_groups]
+    for one in narrow.registered_groups:
+        one.typer_instance = _with_named_commands(one.typer_instance or every, words)
+    return narrow
 
 
 def _move_to_front(words: list[str]) -> list[str]:

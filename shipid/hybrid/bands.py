@@ -124,6 +124,7 @@ class Bands(StoredData):
         pointwise: bool = False,
         kind: str | None = None,
         past: Mapping[str, Array] | None = None,
+        size: Array | None = None,
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] in the frame (11); DataError as of `check`.
 
@@ -131,12 +132,13 @@ class Bands(StoredData):
         level : share of whole paths that the region holds, such as 0.9; with `pointwise`, of positions at each step.
         kind : kind of manoeuvre of the run: the share then holds for runs of this kind.
         past : of the instants, name -> (P, S): taken where the band grows with fast motion.
+        size : `growth` of these paths (S,), where it is known.
         """
         self.check(level, kind)
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
         radius = radius_at_level(self.steps if pointwise else self.table(kind), level)
-        size = self.growth(paths, columns, step, past)
+        size = self.growth(paths, columns, step, past) if size is None else size
         half = (self.along, self.across) if kind is None else self.scales[list(self.kinds).index(kind)].T
         return Region(track_directions(paths), *(np.outer(scale * radius, size) for scale in half))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import cache
 from itertools import repeat
 from types import UnionType
 from typing import Any, Self, get_args, get_origin, get_type_hints
@@ -15,6 +16,8 @@ from pydantic import BaseModel
 from shipid.errors import ResultError
 
 Arrays = Mapping[str, NDArray[Any]]
+field_kinds = cache(get_type_hints)
+"""Dataclass -> kind of each field; resolved once, for a report reads a thousand objects."""
 
 
 class StoredData:
@@ -74,7 +77,7 @@ def _rebuild_value(kind: Any, plain: Any, arrays: Arrays, path: str) -> Any:
     if origin is not None:  # a mapping
         return {name: _rebuild_value(inner[1], entry, arrays, f"{path}.{name}") for name, entry in plain.items()}
     if is_dataclass(kind):
-        hints = get_type_hints(kind)
+        hints = field_kinds(kind)
         parts = {f.name: _rebuild_value(hints[f.name], plain[f.name], arrays, f"{path}.{f.name}") for f in fields(kind)}
         return kind(**parts)  # type: ignore[operator]
     if issubclass(kind, BaseModel):

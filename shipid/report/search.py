@@ -71,7 +71,9 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
         draw=lambda size="all": [
-            _draw_trials(frame if size == "all" else frame[frame.N_D.eq(size)], name, frame[name]) for name in names
+            _draw_trials(mine, name, frame[name])
+            for mine in [frame if size == "all" else frame[frame.N_D.eq(size)]]
+            for name in names
         ],
         controls=[Control("Manoeuvres, N_D", ["all", *counts])] if counts else [],
         chips=[
@@ -114,16 +116,20 @@ def _with_ratio(trials: pd.DataFrame) -> pd.DataFrame:
 
 def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Panel:
     """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
-    states, traces = frame.state.mask(frame.chosen.astype(bool), "chosen"), []
-    drawn = frame.iloc[even_places(len(frame), MOST_DOTS)]
+    drawn, traces = frame.iloc[even_places(len(frame), MOST_DOTS)], []
+    states = drawn.state.mask(drawn.chosen.astype(bool), "chosen").to_numpy()
+    x, ratio = (drawn[column].to_numpy(dtype=float) for column in (name, "ratio"))
+    y = np.where(np.isnan(ratio), DIVERGED_RATIO, np.minimum(ratio, HIGHEST_RATIO)).round(3)
     unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
     for state, (_, symbol, colour) in STATES_OF_TRIALS.items():
-        mine = drawn[states[drawn.index] == state]
-        marker = {"symbol": symbol, "size": 4 if state == "complete" else 6, "color": colour, "opacity": 0.6}
+        mine = states == state
         known = "" if state == "diverged" else ", %{y:.2f} times the best of its cell"
         hover = f"{state}: {escape_name(name.replace('_', ' '))} %{{x:.3g}}{unit}{known}"
-        y = mine.ratio.fillna(DIVERGED_RATIO).where(mine.ratio.isna(), mine.ratio.clip(upper=HIGHEST_RATIO)).round(3)
-        traces.append(make_line(state, mine[name], y, [f"state:{state}"], mode="markers", marker=marker, hover=hover))
+        look: Any = {
+            "marker": {"symbol": symbol, "size": 6 - 2 * (state == "complete"), "color": colour, "opacity": 0.6},
+            "hover": hover,
+        }
+        traces.append(make_line(state, x[mine], y[mine], [f"state:{state}"], mode="markers", **look))
     middle = _median_ratios(frame[frame.ratio.notna()], name)
     ink = {"color": INK, "width": 2.5}
     traces.insert(3, make_line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))

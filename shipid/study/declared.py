@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -159,6 +159,7 @@ def foundations_of(
     """Every member of every family; an identified family has the members of the family that it extends."""
     families = resolve_families(study.family, file)
     foundations: list[Foundation] = []
+    places = {family.name: place for place, family in enumerate(families)}
     for index, family in enumerate(families):
         if family.name.lower() == NO_MODEL:
             raise DocumentError(
@@ -166,7 +167,7 @@ def foundations_of(
                 path=f"family.{index}.name",
             )
         bases = bases_of(family, file, f"family.{index}", known, simulators, trust)
-        parent = families[_root(study.family, index)]
+        parent = families[_root(study.family, places, index)]
         for block in () if isinstance(bases[0], Vessel) else ("identify", "observer"):
             if getattr(family, block) is not None:
                 words = "it needs the equations of a vessel, and this family has none: take a family with a base"
@@ -232,12 +233,11 @@ def check_file_names(names: Sequence[str], path: str, what: str) -> None:
         first[name.lower()] = name
 
 
-def _root(families: Sequence[Family], index: int) -> int:
+def _root(families: Sequence[Family], places: Mapping[str, int], index: int) -> int:
     """Place of the family whose members an identified or observed family takes, as far up as it extends.
 
     DocumentError unless the families on the way only extend: no base, perturbations or members.
     """
-    by_name = {family.name: place for place, family in enumerate(families)}
     while families[index].identify is not None or families[index].observer is not None:
         one, block = families[index], "identify" if families[index].identify is not None else "observer"
         if one.extends is None or one.perturb or "members" in one.model_fields_set:
@@ -246,7 +246,7 @@ def _root(families: Sequence[Family], index: int) -> int:
                 f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]',
                 path=f"family.{index}.{block}",
             )
-        index = by_name[one.extends]
+        index = places[one.extends]
     return index
 
 

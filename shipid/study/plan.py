@@ -130,7 +130,8 @@ class Plan:
     @cached_property
     def pairs(self) -> tuple[tuple[str, StudyMethod], ...]:
         """Every foundation with every method that it meets: a cell each at every amount of data and seed."""
-        return tuple((f.name, way) for f in self.foundations for way in self.methods if f.name in way.foundations)
+        met = {way.name: {*way.foundations} for way in self.methods}
+        return tuple((f.name, way) for f in self.foundations for way in self.methods if f.name in met[way.name])
 
     @cached_property
     def units(self) -> tuple[Unit, ...]:
@@ -164,7 +165,13 @@ def _shared_pairs(
     """The cells of a batch in groups: one group shares a fit of several foundations, or one to the runs."""
     known = {one.name: one for one in foundations}
     of_means = {name for one in known.values() if one.mean_of for name in (one.name, *one.mean_of)}
-    groups: list[tuple[set[Any], list[tuple[str, str]]]] = []
+    above: dict[Any, Any] = {}  # of a cell, or of what cells share: a forest, a tree for each group
+
+    def root(node: Any) -> Any:
+        while above.setdefault(node, node) != node:
+            node = above[node]
+        return node
+
     for name, way in pairs:
         one = known[name]
         shares: set[Any] = {way.name} if way.method.together else set()
@@ -173,14 +180,12 @@ def _shared_pairs(
         elif one.fitted:
             shares.add(one.name)
         shares |= {(part, way.name) for part in (name, *one.mean_of)} if name in of_means else set()
-        mine = [(name, way.name)]
-        for group in [group for group in groups if group[0] & shares]:
-            groups.remove(group)
-            shares |= group[0]
-            mine = [*group[1], *mine]
-        groups.append((shares, mine))
-    order = {(name, way.name): place for place, (name, way) in enumerate(pairs)}
-    return sorted((tuple(sorted(mine, key=order.__getitem__)) for _, mine in groups), key=lambda group: order[group[0]])
+        for share in shares:
+            above[root((name, way.name))] = root(share)
+    groups: dict[Any, list[tuple[str, str]]] = {}
+    for name, way in pairs:
+        groups.setdefault(root((name, way.name)), []).append((name, way.name))
+    return [tuple(cells) for cells in groups.values()]
 
 
 def digest_without_seed(plan: Plan) -> str:
@@ -555,14 +560,13 @@ def check_ranges(document: Document) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
     meant = document.get(UNUSUAL, [])
     for path, value in documents.document_leaves(document):
-        if not isinstance(value, int | float) or isinstance(value, bool):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        limits = next(
+            (row for pattern, row in RANGES.items() if number and documents.match_paths(pattern, [path])), None
+        )
+        if limits is None or limits[0] <= value <= limits[1]:
             continue
-        limits = next((row for pattern, row in RANGES.items() if documents.match_paths(pattern, [path])), None)
         named = documents.path_with_names(document, path)
-        if limits is None or any(documents.match_paths(str(one), [path, named]) for one in meant):
-            continue
-        least, most, unit = limits
-        if not least <= value <= most:
-            message = f"{value:g}: expected {least:g} to {most:g} {unit}"
+        if not any(documents.match_paths(str(one), [path, named]) for one in meant):
             remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
-            raise DocumentError(f"{message}; {remedy}", path=path)
+            raise DocumentError(f"{value:g}: expected {limits[0]:g} to {limits[1]:g} {limits[2]}; {remedy}", path=path)

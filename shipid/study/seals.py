@@ -80,7 +80,8 @@ def sealed_faults(folder: Path, among: str = "", names: Collection[str] = ()) ->
 
     among : how the paths in the folder begin that are looked at. names : of the seals; by default all.
     """
-    return [fault for name in sorted(names or seal_names(folder)) for fault in _faults(folder, name, among)]
+    digest = study_digest(folder)
+    return [fault for name in sorted(names or seal_names(folder)) for fault in _faults(folder, name, among, digest)]
 
 
 def check_seals(folder: Path, among: str = "", names: Collection[str] = ()) -> None:
@@ -120,14 +121,14 @@ def _read(seal: Path) -> tuple[str, list[tuple[str, str]]]:
     return first.removeprefix(STUDY), known
 
 
-def _faults(folder: Path, name: str, among: str) -> Iterator[Fault]:
+def _faults(folder: Path, name: str, among: str, digest_of_study: str | None) -> Iterator[Fault]:
     seal = seal_file(folder, name)
     try:
         study, known = _read(seal)
     except (FileNotFoundError, ValueError):
         yield Fault(name, f"{FOLDER}/{seal.name}", "changed")
         return
-    foreign = study != (study_digest(folder) or study)
+    foreign = study != (digest_of_study or study)
     for digest, path in known:
         if path.startswith(among):
             try:

@@ -350,11 +350,9 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
     trials = [
-        {"cell": row["cell"]}
-        | {key: value for key, value in trial.items() if key != "params"}
-        | trial.get("params", {})
-        for _, row in rows.iterrows()
-        for trial in row["trials"]
+        {"cell": cell} | {key: value for key, value in trial.items() if key != "params"} | trial.get("params", {})
+        for cell, mine in zip(rows["cell"], rows["trials"], strict=True)
+        for trial in mine
     ]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
     keys = [unit.key for unit in plan.units]

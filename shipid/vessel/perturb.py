@@ -313,22 +313,22 @@ SOURCES = ("base", "predictions", "function", "fmu")
 
 def resolve_families(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:
     """Families with `extends` written out; unknown or circular ones, and missing bases, raise DocumentError."""
-    by_name: dict[str, Family] = {}
+    places: dict[str, int] = {}
     for index, family in enumerate(families):
-        if family.name in by_name:
+        if family.name in places:
             raise DocumentError(f"two families are called {family.name!r}", file=file, path=f"family.{index}.name")
-        by_name[family.name] = family
+        places[family.name] = index
 
     def written_out(family: Family, above: tuple[str, ...]) -> Family:
-        where = f"family.{list(by_name).index(family.name)}"
+        where = f"family.{places[family.name]}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
         parent = Family(name="empty")
         if family.extends is not None:
-            if family.extends not in by_name:
-                hint = suggest_name(family.extends, by_name)
+            if family.extends not in places:
+                hint = suggest_name(family.extends, places)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
-            parent = written_out(by_name[family.extends], (*above, family.name))
+            parent = written_out(families[places[family.extends]], (*above, family.name))
         own = {key: value for key in SOURCES if (value := getattr(family, key)) is not None}
         if len(own) > 1:
             fault = f"stands beside {next(iter(own))!r}: give one of {', '.join(SOURCES)}"

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from shipid.engine.rollout import rollout
+from shipid.study.plan import build_plan
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.rollouts import inputs
 from tests.benchmarks.timing import best_of
 from tests.study.tiny import events_here, tiny_plan
 
-VARIANTS, SAMPLES, CELLS, MODELS = (10, 100), (1000, 10000), (40, 400), (10, 100)
+VARIANTS, SAMPLES, CELLS, MODELS, FAMILIES = (10, 100), (1000, 10000), (40, 400), (10, 100), (300, 3000)
 STEPS = 30
 ROUNDS, STUDY_ROUNDS = 5, 2
 
@@ -24,7 +25,8 @@ ROUNDS, STUDY_ROUNDS = 5, 2
 def run() -> dict[str, Any]:
     """Time per unit at ten times the units over time per unit: 1 is linear, less is better than linear."""
     result: dict[str, Any] = {}
-    for name, seconds in {"variants": variants(), "samples": samples(), "cells": cells(), "models": models()}.items():
+    parts = {"variants": variants, "samples": samples, "cells": cells, "models": models, "families": families}
+    for name, seconds in ((name, measured()) for name, measured in parts.items()):
         few, many = sorted(seconds)
         result |= {f"{count} {name} [s]": round(seconds[count], 4) for count in (few, many)}
         result[f"{name}: time per unit, {many} / {few}"] = round(seconds[many] / seconds[few] * few / many, 3)
@@ -64,6 +66,22 @@ def cells() -> dict[int, float]:
 def models() -> dict[int, float]:
     """The same with more models, which train together: two batches."""
     return _studies({count: {"family.1.members": count - 2} for count in MODELS})
+
+
+def families() -> dict[int, float]:
+    """The plan of a study of so many families, from its document, with its units of work."""
+    with tempfile.TemporaryDirectory() as folder:
+        plan = tiny_plan(Path(folder))
+        one = plan.document["family"][1] | {"members": 1}
+
+        def planned(count: int) -> Any:
+            many = plan.document | {
+                "family": [plan.document["family"][0], *({**one, "name": f"f{i}"} for i in range(count))]
+            }
+            return lambda: build_plan(many, Path(plan.file)).units
+
+        seconds = best_of({str(count): planned(count) for count in FAMILIES}, STUDY_ROUNDS)
+    return {int(count): value for count, value in seconds.items()}
 
 
 def _studies(changes: Mapping[int, Mapping[str, Any]]) -> dict[int, float]:
