@@ -163,11 +163,11 @@ def _jax_way(vessel: Vessel, arrays: list[np.ndarray], values: np.ndarray, preci
         held = second(commands, wind, known)
         return jax.lax.scan(lambda x, _: (x + jnp.stack(main(x, [], [0.0] * 3, known, held)), None), x, length=STEPS)[0]
 
-    known = first(jnp.asarray(values.T.astype(precision)))
+    known = [np.asarray(one) for one in first(jnp.asarray(values.T.astype(precision)))]
     inputs_ = [jnp.asarray(part.astype(precision)) for part in arrays]
     samples = jax.vmap(roll_out, (None, 1, 1, 1), 1)
     if len(values) == 1:
-        compiled = jax.jit(lambda *given: samples([float(one[0]) for one in known], *given)[:, None])
+        compiled = jax.jit(lambda *given: samples([one.item() for one in known], *given)[:, None])
     else:
         compiled = jax.jit(lambda *given: jax.vmap(samples, (0, None, None, None), 1)(known, *given))
     return lambda: compiled(*inputs_).block_until_ready()
