@@ -129,6 +129,7 @@ void run(long members, long stride, long steps, const REAL *numbers, const REAL 
         for (int i = 0; i < 2; ++i) wind[j][i] = *(const U *)(held + (member * 18 + 16 + i) * stride + g + j * W);
       }
       for (long k = 0; k < steps; ++k)
+#pragma GCC unroll 8 // so that the compiler interleaves the groups
         for (int j = 0; j < GROUPS; ++j) step(x[j], p, table, units[j], wind[j][0], wind[j][1]);
       for (int j = 0; j < GROUPS; ++j)
         for (int i = 0; i < 6; ++i) *(U *)(out + (i * members + member) * stride + g + j * W) = x[j][i];

@@ -23,7 +23,7 @@ SIDES = ("port", "starboard")
 UNIT = "J_min J_max Jy_max J_t K_x.1 K_x.J K_x.JJ K_x.JJJ K_x.Jt K_x.yy K_x.Jyy k_over k_over2 k_under".split()
 UNIT += "K_y.y K_y.Jy K_y.y|y| k_side k_sideJ".split()
 SIDE = "vvv rrv v|v| v|r| uv uuv rrr vvr r|v| r|r| ur uur".split()
-GROUPS = 8  # vectors that step together
+GROUPS = 2  # vectors that step together
 
 Array = np.ndarray[Any, Any]
 
@@ -74,7 +74,17 @@ def _compiled(of: Any, lanes: int) -> Any:
     }
     words = [f"-D{name}={','.join(map(repr, numbers))}" for name, numbers in macros.items()]
     words += [f"-D{name}={value}" for name, value in sizes.items()]
-    options = ["-O3", "-march=native", "-mprefer-vector-width=512", "-fno-math-errno", "-shared", "-fPIC", "-w"]
+    options = [
+        "-O3",
+        "-fschedule-insns",
+        "-fsched-pressure",
+        "-march=native",
+        "-mprefer-vector-width=512",
+        "-fno-math-errno",
+        "-shared",
+        "-fPIC",
+        "-w",
+    ]
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "by_hand.so"
         subprocess.run(["gcc", *options, *words, str(Path(__file__).with_suffix(".c")), "-o", str(library)], check=True)

@@ -177,10 +177,12 @@ def _casadi_way(vessel: Vessel, arrays: list[np.ndarray], values: np.ndarray) ->
     """As a user of CasADi writes it: `mapaccum` over steps, generated C, `map` over samples, members in a loop."""
     model = vessel_dynamics(vessel)
     x, c, e = ca.SX.sym("x", 6), ca.SX.sym("c", 4), ca.SX.sym("e", 2)
-    p = ca.SX.sym("p", values.shape[1])
-    one = ca.Function("step", [x, c, e, p], [x + model.rates(x, ca.SX(0, 1), c, e, p, ca.SX.zeros(3))])
+    alone = len(values) == 1
+    p = ca.SX.sym("p", 0 if alone else values.shape[1])
+    numbers = ca.SX(values[0]) if alone else p
+    one = ca.Function("step", [x, c, e, p], [x + model.rates(x, ca.SX(0, 1), c, e, numbers, ca.SX.zeros(3))])
     given = [ca.MX.sym(name, one.size1_in(i)) for i, name in enumerate("xcep")]
     path = one.mapaccum(STEPS)(given[0], *(ca.repmat(part, 1, STEPS) for part in given[1:]))
     jit = {"jit": True, "compiler": "shell", "jit_options": {"compiler": "gcc", "flags": FLAGS["O3"]}}
     mapped = ca.Function("last", given, [path[:, -1]], jit).map("samples", "serial", SAMPLES, [3], [])
-    return lambda: np.stack([np.array(mapped(*arrays, row)) for row in values], axis=1)
+    return lambda: np.stack([np.array(mapped(*arrays, row[: p.numel()])) for row in values], axis=1)
