@@ -22,7 +22,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.engine.collect import collect_terms
 from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, count_threads, integrate_step
 from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build_library, obtain_library, run_compiler
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, PrintedFunction, print_function
@@ -68,9 +67,7 @@ _ARRAYS = {
 _ADD = "for (int i = 0; i < {0}; ++i) {3}[i] = {1}[i] + K({4!r}) * {2}[i];"
 _FOR_GCC = """#ifndef __clang__
 #pragma GCC optimize "no-tree-pre" // else registers that a step needs hold what one branch has computed: 7 % slower
-#ifndef __AVX512F__
-#pragma GCC optimize "sched-pressure" // else 16 registers are too few for what is computed early
-#endif
+#pragma GCC optimize "sched-pressure" // else registers are too few for what is computed early: 5 % slower
 #endif
 """
 PARTS = 12  # tasks for each core at least: for an even load
@@ -287,11 +284,6 @@ def step_statements(
     return [forward_statement(line, num_states, num_memory, rates, advance) for line in lines], after, later
 
 
-def _collected_rates(model: Dynamics) -> ca.Function:
-    """The rates of a model as the engine computes them."""
-    return collect_terms(model.rates, frozenset(name for stage in STAGES for name in stage))
-
-
 class _RolloutSource(StagedSource):
     """C source of one model: terms of parameters are computed once, terms of inputs once while they are constant."""
 
@@ -299,7 +291,7 @@ class _RolloutSource(StagedSource):
         self, model: Dynamics, step: float, method: Method, wanted: CompilerTarget, tables: Mapping[int, RampTable]
     ) -> None:
         self.model, self.step, self.method, self.wanted = model, step, method, wanted
-        rates = print_function(_collected_rates(model), STAGES, replace(C, lookup=wanted.lookup), tables)
+        rates = print_function(model.rates, STAGES, replace(C, lookup=wanted.lookup), tables)
         self.equations = [rates, print_function(model.advance, STAGES, C)]
         self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
         self.all = [*self.equations, *self.sums]
@@ -408,7 +400,6 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
         stage1(c, e, saved0, saved1);
       }}
       {self.one_step()}
-      for (int i = 0; i < {nx}; ++i) all += x[i];
       for (int i = 0; i < {nm}; ++i) all += m[i];
       for (int i = {n}; i < {2 * n}; ++i) greatest[j] = v_max(v_fabs(x[i]), greatest[j]);
       greatest[j] += 0 * all;
@@ -420,6 +411,7 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
     }}
   }}
   EACH_GROUP(end) {{
+    for (int i = 0; i < {nx}; ++i) greatest[j] += 0 * states[j][i]; // a state that is no number stays none
     if (goal) *AT(sums, 0) = distance[j];
     *AT(worst, 0) = greatest[j];
   }}
@@ -443,7 +435,7 @@ def _compile_rollout(
     model: Dynamics, step: float, method: Method, precision: Precision, looked_up: Sequence[int]
 ) -> Any:
     """The compiled function `run` of a model, from the cache if possible; some of its tables are looked up."""
-    tables = {k: find_tables(_collected_rates(model))[k] for k in looked_up}
+    tables = {k: find_tables(model.rates)[k] for k in looked_up}
     return compile_source(_RolloutSource(model, step, method, compiler_target(precision), tables).text())
 
 
@@ -549,9 +541,7 @@ def _run_job(model: Dynamics, batch: RolloutBatch, job: RolloutJob, precision: P
     }
     sizes = (parts, wide, batch.state.shape[1], job.num_steps, job.every, len(job.rows))
     work = wide / lanes / parts * job.num_steps * (1 + sum(part.shape[1] for part in drawn))
-    looked_up = (
-        tuple(even_tables(_collected_rates(model), batch.parameters)) if compiler_target(precision).lookup else ()
-    )
+    looked_up = tuple(even_tables(model.rates, batch.parameters)) if compiler_target(precision).lookup else ()
     run = _compile_rollout(model, job.step, job.method, precision, looked_up)
     run_tasks(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
 

@@ -154,20 +154,6 @@ def find_tables(function: ca.Function) -> Mapping[int, RampTable]:
     return _TableSearch(function).tables()
 
 
-@lru_cache(maxsize=64)
-def inside_tables(function: ca.Function) -> frozenset[int]:
-    """Instructions that compute the tables of a function from arguments, knots, ordinates and slopes."""
-    operands = InstructionGraph(function).operands
-    inside: set[int] = set()
-    for end, table in find_tables(function).items():
-        inside.add(end)
-        given, left = {table.x, table.ordinate, table.slope, *table.knots, *table.bends}, [end]
-        while left:
-            left = [i for k in left for i in operands[k] if i not in given and i not in inside]
-            inside.update(left)
-    return frozenset(inside)
-
-
 def even_tables(function: ca.Function, parameters: Array) -> Mapping[int, RampTable]:
     """Tables whose knots depend on the input `parameters` alone, and are evenly apart for all rows (V, P) of these."""
     tables = find_tables(function)

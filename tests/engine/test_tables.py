@@ -109,7 +109,7 @@ def test_a_lookup_has_the_values_of_the_ramps(
 )
 def test_the_source_of_a_ship_with_tables_looks_them_up() -> None:
     model = vessel_dynamics(SHIP)
-    tables = even_tables(native._collected_rates(model), np.array([list(SHIP.parameters.values())]))
+    tables = even_tables(model.rates, np.array([list(SHIP.parameters.values())]))
     source = native._RolloutSource(model, 1.0, "euler", compiler_target(), tables).text()
     assert len(tables) == 3
     assert source.count("v_value(&") == 3
