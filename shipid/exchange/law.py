@@ -159,7 +159,8 @@ class Hierarchy:
         known = cells.head(0) if own is None else response_rows(self.response, own)
         joined = pd.concat([known, cells], ignore_index=True)
         mean, jacobian = self.mean(joined)
-        count, freedom = len(known), self.freedom
+        each = sum(level == SHIP for level, _ in self.response.levels)  # effects that each ship has
+        count, freedom = len(known), float(max(self.ships - each, 3))
         spread = self.spread(joined, jacobian, count)
         centre = np.zeros(len(cells))
         if count:
@@ -173,11 +174,6 @@ class Hierarchy:
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         scale = np.sqrt(freedom / rng.chisquare(freedom, draws))
         return np.asarray(centre + scale[:, None] * (rng.standard_normal((draws, len(cells))) @ root.T))
-
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom of Student draws for a new ship: ships less the effects that each of them has."""
-        return float(max(self.ships - sum(level == SHIP for level, _ in self.response.levels), 3))
 
 
 def _both_features(response: Response, cells: pd.DataFrame) -> tuple[Array, Array]:

@@ -310,7 +310,7 @@ def check_document(document: Document, file: str) -> Vessel:
 def _check_numbers(vessel: Vessel) -> None:
     """Checks of the values of a document whose names are valid."""
     for path, key, block in term_blocks(vessel.document):
-        _check_angles(path, key, block, vessel.file)
+        _check_rising_angles(path, key, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
     fault = out_of_range(vessel.document, vessel.parameters, vessel.units)
@@ -358,7 +358,7 @@ def _check_sense(vessel: Vessel) -> None:
             )
 
 
-def _check_angles(path: str, key: str, block: Mapping[str, Any], file: str) -> None:
+def _check_rising_angles(path: str, key: str, block: Mapping[str, Any], file: str) -> None:
     """DocumentError for angles that do not rise; of a propeller in four quadrants for a gap at 180 deg, too."""
     for name, value in block.items():
         if isinstance(value, list) and name.endswith("_deg") and any(b <= a for a, b in pairwise(value)):

@@ -72,15 +72,6 @@ def weaving(t: np.ndarray) -> pd.DataFrame:
     return pd.DataFrame({name: column[::100] for name, column in values.items()}).assign(**{"port.n": 2.0})
 
 
-def test_velocity_path_is_the_position_path_on_a_consistent_log() -> None:
-    rng = np.random.default_rng(3)
-    frame = weaving(np.append(0.0, np.cumsum(rng.uniform(0.2, 0.6, 300))))
-    windows = [cut_windows(as_dataset(frame), horizon=15, path=path) for path in ("position", "velocity")]
-    # positions are interpolated linearly between rows 0.6 s apart, 0.05 rad/s, 6 m/s: error under v r dt^2 / 8
-    np.testing.assert_allclose(windows[0].future, windows[1].future, atol=2 * 6 * 0.06 * 0.6**2 / 8)
-    np.testing.assert_array_equal(windows[0].columns["north"], windows[1].columns["north"])
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(("apart", "share"), [(2.0, 0.05), (5.0, 0.15)])
 def test_between_coarse_rows_the_path_turns_with_the_ship(seed: int, apart: float, share: float) -> None:
