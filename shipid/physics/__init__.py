@@ -10,7 +10,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 from shipid.physics import hull, learned, propeller, radiation, restoring, rudder, thruster, waves, wind
@@ -90,11 +89,9 @@ TERMS |= {
     "hull.learned": Term(learned.learned_wrench),
     "restoring.hydrostatic": Term(restoring.hydrostatic),
     "radiation.heave_pitch": Term(
-        radiation.heave_pitch, states=partial(radiation.mode_states, drivers="wq"), rates=radiation.heave_pitch_rates
+        radiation.heave_pitch, states=radiation.heave_pitch_states, rates=radiation.heave_pitch_rates
     ),
-    "radiation.roll": Term(
-        radiation.roll, states=partial(radiation.mode_states, drivers="p"), rates=radiation.roll_rates
-    ),
+    "radiation.roll": Term(radiation.roll, states=radiation.roll_states, rates=radiation.roll_rates),
     "waves.first_order": Term(
         waves.first_order, drawn=waves.first_order_widths, states=waves.passage_states, rates=waves.passage_rates
     ),

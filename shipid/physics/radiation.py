@@ -30,9 +30,13 @@ def kernel_force(state: SX, a: Sequence[SX], b: Sequence[SX]) -> SX:
     return sum((a_k * state[2 * k] + b_k * state[2 * k + 1] for k, (a_k, b_k) in enumerate(pairs)), ca.SX(1, 1))
 
 
-def mode_states(block: Mapping[str, Any], drivers: Sequence[str]) -> tuple[str, ...]:
-    """Names of the states: two (c, s) for each mode, driven by the first of some rates, then by the next."""
+def _names(block: Mapping[str, Any], drivers: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{driver}{k}{part}" for driver in drivers for k in range(len(block["sigma"])) for part in "cs")
+
+
+def heave_pitch_states(block: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the states: two (c, s) for each mode, first driven by the heave rate, then by the pitch rate."""
+    return _names(block, ("w", "q"))
 
 
 def heave_pitch(
@@ -68,6 +72,11 @@ def heave_pitch_rates(
     middle = state.numel() // 2
     heave = mode_rates(heave_rate(eta, nu), state[:middle], sigma, omega)
     return ca.vertcat(*heave, *mode_rates(nu[4], state[middle:], sigma, omega))
+
+
+def roll_states(block: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the states: two (c, s) for each mode, driven by the roll rate."""
+    return _names(block, ("p",))
 
 
 def roll(
