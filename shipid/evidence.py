@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtr, stdtrit
 
-from shipid.metrics import coverage_by_run
+from shipid.metrics import Array, coverage_by_run
 
-Array = NDArray[np.float64]
 SIGNIFICANT = 0.025  # of one side: an interval of 95 % is free of 0
 FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
 FEWEST_WORLDS = 3  # below which no interval over worlds is given

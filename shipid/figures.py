@@ -206,27 +206,27 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
 
 def estimates(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Estimates of an identification with 95 % intervals, as factors on the base values."""
-    return _draw("estimates", _identification(source), dark=dark)
+    return _draw("estimates", source, dark=dark)
 
 
 def correlations(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Correlations of the estimates of an identification; needs two of them."""
-    return _draw("correlations", _identification(source), dark=dark)
+    return _draw("correlations", source, dark=dark)
 
 
 def free_runs(source: IdentificationContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
     """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
-    return _draw("free-runs", _identification(source), [run], dark=dark)
+    return _draw("free-runs", source, [run], dark=dark)
 
 
 def residuals(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Autocorrelation of the residuals of an identification."""
-    return _draw("residuals", _identification(source), dark=dark)
+    return _draw("residuals", source, dark=dark)
 
 
 def profiles(source: IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Profile likelihoods of an identification, of the paths that were asked for."""
-    return _draw("profiles", _identification(source), dark=dark)
+    return _draw("profiles", source, dark=dark)
 
 
 def track(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
@@ -253,8 +253,8 @@ def _draw(
     lack: str = "the results hold no rows for it",
 ) -> go.Figure:
     """Draw a figure of a page by its id; ShipidError where there is none, with what the source lacks for it."""
-    page = next(page for kind, page in PAGES.items() if isinstance(content, kind))
-    section = next(one for one in page.values() if name in one.items)
+    kind, section = next((kind, one) for kind, page in PAGES.items() for one in page.values() if name in one.items)
+    check_class("source", content, kind, "as of `run_identification`")  # others are made of what the user gave
     figure = section.draw_item(name, content)
     if not isinstance(figure, PageFigure):
         raise ShipidError(f"there is nothing to draw: {lack}", path="figures")
@@ -281,11 +281,6 @@ def content_of(source: Source) -> ReportContent:
 
     check_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")
     return report_content(source)
-
-
-def _identification(source: IdentificationContent) -> IdentificationContent:
-    check_class("source", source, IdentificationContent, "as of `run_identification`")
-    return source
 
 
 def _manoeuvre(source: MeasuredManoeuvre | ManoeuvreContent) -> ManoeuvreContent:

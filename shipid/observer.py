@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import check_class
-from shipid.checked import CheckedModel
+from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, after_pauses, clock_slack, stretch_rows
 from shipid.data.windows import PathSource, Windows
 from shipid.engine.casadi import summed_rates
@@ -84,8 +84,6 @@ LONGEST_PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the 
 STEP_SLACK = 1e-5  # of a step: so much longer than the longest it is still one
 CALM_WIND = 1e-6  # m/s: keeps the direction of no wind defined
 TRACE_OF_WIND = 1e-12  # m/s: of a wind that is exactly 0, so that its direction has a derivative
-NotNegativeNumber = Annotated[FiniteFloat, Field(ge=0)]
-PositiveNumber = Annotated[FiniteFloat, Field(gt=0)]
 
 
 class Observer(CheckedModel, BaseModel):
@@ -99,41 +97,33 @@ class Observer(CheckedModel, BaseModel):
     measured: Annotated[tuple[Motion, ...], Field(description="columns that are measurements; always `psi`")] = (
         MEASURED_MOTION
     )
-    force: Annotated[NotNegativeNumber, Field(description="standard deviation of the slow force at first, x m g")] = (
-        3e-3
-    )
-    moment: Annotated[NotNegativeNumber, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
+    force: Annotated[NotNegative, Field(description="standard deviation of the slow force at first, x m g")] = 3e-3
+    moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
-        tuple[NotNegativeNumber, ...],
+        tuple[NotNegative, ...],
         Field(
             min_length=1,
             description="levels: change of the force in 1 s, x m g; of the moment 3 times, x I_z g / L",
         ),
     ] = (1e-5, 2e-4)
     model_error: Annotated[
-        NotNegativeNumber,
+        NotNegative,
         Field(description="white acceleration over the change of the slow one, sqrt(s); level 0 of `waves` alone"),
     ] = 10.0
-    jump: Annotated[NotNegativeNumber, Field(description="share of a change by an order that the physics may miss")] = (
-        1.0
-    )
-    settle: Annotated[PositiveNumber, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
-    current: Annotated[
-        NotNegativeNumber, Field(description="standard deviation of the current, x sqrt(g L); 0: none")
-    ] = 0.03
+    jump: Annotated[NotNegative, Field(description="share of a change by an order that the physics may miss")] = 1.0
+    settle: Annotated[Positive, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
+    current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
     waves: Annotated[
-        tuple[NotNegativeNumber, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
+        tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
     ] = (0.0, 5e-3, 2e-2)
-    period: Annotated[PositiveNumber, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
+    period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
     damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.5
     noise: Annotated[
-        dict[Motion, PositiveNumber], Field(description="column -> standard deviation of a sample, SI; others by size")
+        dict[Motion, Positive], Field(description="column -> standard deviation of a sample, SI; others by size")
     ] = {}
-    memory: Annotated[PositiveNumber, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = (
-        20.0
-    )
+    memory: Annotated[Positive, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = 20.0
     fade: Annotated[
-        NotNegativeNumber,
+        NotNegative,
         Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; very large: it lasts"),
     ] = 12.0
     choose: Annotated[

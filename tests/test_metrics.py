@@ -39,7 +39,6 @@ def test_summary_by_hand():
         "end": pytest.approx(5.0),
         "end_90": pytest.approx(9.0),
         "status": "ok",
-        "failed_share": 0.0,
     }
 
 
@@ -49,7 +48,6 @@ def test_a_diverged_window_is_reported_and_not_averaged_away():
     error[1:, 6] = np.nan
     result = metrics.summarise_errors(error)
     assert result["status"] == "diverged"
-    assert result["failed_share"] == 2 / 8
     assert np.isnan([result["mean"], result["p90"], result["rms"]]).all()
 
 

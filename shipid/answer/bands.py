@@ -15,12 +15,11 @@ from shipid.answer.verdict import least_to_greatest, model_list
 from shipid.evidence import share_interval
 from shipid.hybrid.bands import Region
 from shipid.metrics import coverage_share
-from shipid.predictor import NO_BAND
+from shipid.predictor import NO_BAND, Array
 from shipid.report.wording import join_few_names, metres_text
 from shipid.study.results import Results
 from shipid.units import level_text, percent_text, plural_word
 
-Array = np.ndarray
 REPORTED_LEVELS = (0.5, 0.8, 0.9, 0.95)
 """Nominal levels that the report compares with what was measured."""
 

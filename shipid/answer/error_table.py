@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
 from shipid.evidence import (
@@ -21,13 +20,12 @@ from shipid.evidence import (
     log_error,
     paired_difference,
 )
-from shipid.metrics import error_at_horizon, position_error
+from shipid.metrics import Array, error_at_horizon, position_error
 from shipid.report.wording import REGRESSION, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import Batch
 from shipid.study.results import Results
 
-Array = NDArray[np.float64]
 Metric = Literal["H", "H_90", "H_end"]
 PHYSICS_ONLY = -1  # place of the physics alone in a term
 ErrorTerm = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or PHYSICS_ONLY

@@ -44,14 +44,13 @@ from shipid.evidence import (
     paired_difference,
     share_interval,
 )
-from shipid.metrics import coverage_share, position_error
+from shipid.metrics import Array, coverage_share, position_error
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import unfair_reason, verdict_method
 from shipid.study.results import Results
 from shipid.units import level_text, percent_text
 
-Array = NDArray[np.float64]
 ABOUT = 0.10  # R2: "about as good" means a mean error at most 10 % above
 BROKEN_BY = 0.05  # B2: a share that lies so far below its level is a broken promise
 

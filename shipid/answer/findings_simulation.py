@@ -11,7 +11,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, error_table
 from shipid.answer.verdict import (
@@ -47,14 +46,13 @@ from shipid.evidence import (
     partial_conjunction,
     which_significant,
 )
-from shipid.metrics import path_roughness, rank_correlation
+from shipid.metrics import Array, path_roughness, rank_correlation
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import verdict_method
 from shipid.study.results import Results
 from shipid.units import percent_text, plural_word
 
-Array = NDArray[np.float64]
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
 ALIKE, UNLIKE = 0.95, 0.8  # S5
 ROUGH = 1.5  # S7: times the roughness of the true paths

@@ -81,6 +81,10 @@ class Answer:
             write_table(file, rows)
             self.say(f"{what} -> {file}", file=file)
 
+    def say_page(self, page: Path) -> None:
+        """Say where a page was written."""
+        self.say(f"page -> {page}", page=page)
+
     def say_dataset(self, dataset: Dataset, file: Path) -> None:
         """Say how large a dataset is that was written."""
         runs, rows = len(dataset.runs), len(dataset.frame)

@@ -199,8 +199,7 @@ def data_check(
             from shipid.data.contents import check_content
             from shipid.report.logs import write_checks
 
-            page = write_checks(check_content(dataset.stem, log, checks), html)
-            answer.say(f"plots: {page}", page=page)
+            answer.say_page(write_checks(check_content(dataset.stem, log, checks), html))
         shown = counts.agg(runs=("ok", "size"), failed=("failed", "sum")).reset_index()
         answer.records("checks", checks, shown=shown)
         answer.records("failed", failed, {"run": "run", "check": "failed", "sentence": "what to look at"})

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from shipid.arguments import check_choice
 from shipid.cli.answer import Json, open_answer
 from shipid.errors import ShipidError
 
@@ -16,8 +15,8 @@ OVER_FIRST = {"ratio": "over the first row", "ratio_low": "95 % from ", "ratio_h
 
 
 def expect_command(
-    length: Annotated[float | None, typer.Option(help="m, between perpendiculars")] = None,
-    speed: Annotated[float | None, typer.Option(help="m/s, in service")] = None,
+    length: Annotated[float | None, typer.Option(min=0.01, max=1e6, help="m, between perpendiculars")] = None,
+    speed: Annotated[float | None, typer.Option(min=0.001, max=1e6, help="m/s, in service")] = None,
     vessel: Annotated[
         str | None, typer.Option(help="bundled name or file, instead of --length and --speed: it is simulated")
     ] = None,
@@ -26,28 +25,26 @@ def expect_command(
         list[str] | None, typer.Option(help="template, sister, identified, model-test, none, ...; may be repeated")
     ] = None,
     a: Annotated[
-        float | None, typer.Option("--A", help="m, mean error of the physics alone, of one --kind or any")
+        float | None,
+        typer.Option("--A", min=1e-6, max=1e6, help="m, mean error of the physics alone, of one --kind or any"),
     ] = None,
     runs: Annotated[list[int] | None, typer.Option(min=0, help="that train; may be repeated")] = None,
     ahead: Annotated[
         float | None, typer.Option(min=0.01, help="ship lengths at 0.75 of the service speed; default: 2")
     ] = None,
-    sea: Annotated[str, typer.Option(help="calm, ordinary or rough: a third of the ships; default: all")] = "",
+    sea: Annotated[
+        Literal["calm", "ordinary", "rough"] | None, typer.Option(help="of a third of the ships; default: of all")
+    ] = None,
     law: Annotated[Path | None, typer.Option(help="another law.json")] = None,
     as_json: Json = False,
 ) -> None:
     """Say what error to expect from a kind of physics and a number of runs, with its 95 % interval."""
     from shipid.exchange import expect
-    from shipid.exchange.law import SEAS, UnseenShip, read_law
+    from shipid.exchange.law import UnseenShip, read_law
 
     exchange, amounts = read_law(law) if law else read_law(), sorted({*(runs or [4, 12, 40])})
-    if sea:
-        check_choice("--sea", sea, SEAS)
-        if vessel or study:
-            raise ShipidError("goes with --length and --speed: a vessel or a study has its own sea", path="--sea")
-    for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
-        if number is not None and not 0 < number < 1e6:
-            raise ShipidError(f"{number:g}: must be above 0", path=option)
+    if sea and (vessel or study):
+        raise ShipidError("goes with --length and --speed: a vessel or a study has its own sea", path="--sea")
     idle = {"--length": length, "--speed": speed} | ({"--vessel": vessel, "--ahead": ahead} if study else {})
     for option, value in idle.items():
         if value is not None and (study or vessel):
@@ -69,7 +66,7 @@ def expect_command(
             option = "--length" if length is None else "--speed"
             raise ShipidError("missing: give --length and --speed, or --vessel, or --study", path=option)
         else:
-            ship = UnseenShip(length, speed, sea=sea)
+            ship = UnseenShip(length, speed, sea=sea or "")
     table = expect.expected_errors(exchange, ship, foundations, amounts, ahead)
     with open_answer(as_json) as answer:
         sentence = expect.expectation_sentence(table.iloc[0], ship, ahead)

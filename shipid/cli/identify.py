@@ -66,7 +66,8 @@ def identify_command(
     ] = None,
     profile: Annotated[list[str] | None, typer.Option(help="path whose profile likelihood is followed")] = None,
     band: Annotated[
-        float | None, typer.Option(help="level of bands on the measures of standard manoeuvres, such as 0.9")
+        float | None,
+        typer.Option(min=0.001, max=0.999, help="level of bands on the measures of standard manoeuvres, such as 0.9"),
     ] = None,
     design: Annotated[bool, typer.Option("--design", help="rank the manoeuvres to run next")] = False,
     structures: Annotated[
@@ -100,8 +101,6 @@ def identify_command(
 
     if structures is None and folds is not None:
         raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
-    if band is not None and not 0 < band < 1:
-        raise ShipidError(f"{band:g}: must be between 0 and 1, such as 0.9", path="--band")
     default = Path(f"{document_stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     file = check_output(out or default, endings=(".toml",))
     given: dict[str, Any] = {
@@ -152,8 +151,7 @@ def identify_command(
         if html is not None:
             from shipid.report.identification import write_identification
 
-            page = write_identification(outcome.page(dataset, command_line()), html)
-            answer.say(f"page -> {page}", page=page)
+            answer.say_page(write_identification(outcome.page(dataset, command_line()), html))
 
 
 @contextmanager
@@ -195,8 +193,7 @@ def _compare_structures(
     if html is not None:
         from shipid.report.structures import write_structures
 
-        page = write_structures(compared.page(dataset, command_line()), html)
-        answer.say(f"page -> {page}", page=page)
+        answer.say_page(write_structures(compared.page(dataset, command_line()), html))
 
 
 def _show_structures(compared: StructureComparison, answer: Answer) -> None:

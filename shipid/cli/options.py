@@ -52,17 +52,18 @@ def parse_assignments(given: list[str], option: str, example: str, *, text: bool
 
 
 Kind = Annotated[str | None, typer.Option(help="kind of manoeuvre under way: its band, such as zigzag")]
+Level = Annotated[
+    float | None,
+    typer.Option(min=0.001, max=HIGHEST, help="share of whole paths that a band is to hold, such as 0.9: shows it"),
+]
 Adaptive = Annotated[
     float | None,
-    typer.Option(help="rate at which the band adapts along each run, such as 0.02; default: it does not"),
+    typer.Option(min=1e-6, max=1, help="rate at which the band adapts along each run, such as 0.02; default: none"),
 ]
 
 
 def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
-    """Raise ShipidError for a level or a rate out of range, and where --kind or --adaptive come without --level."""
-    for number, most, option in ((level, HIGHEST, "--level"), (adaptive, 1.0, "--adaptive")):
-        if number is not None and not 0 < number <= most:
-            raise ShipidError(f"{number:g}: must be above 0 and up to {most:g}", path=option)
+    """Raise ShipidError where --kind or --adaptive come without --level."""
     if level is None and (kind is not None or adaptive is not None):
         raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 import shipid
-from shipid.cli.options import Adaptive, Folder, Kind, check_band, command_line
+from shipid.cli.options import Adaptive, Folder, Kind, Level, check_band, command_line
 from shipid.cli.outputs import check_output
 from shipid.errors import DocumentError, ShipidError
 from shipid.files import TABLES
@@ -21,9 +21,7 @@ def predict_command(
     cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet")],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv; default: <cell>.parquet")] = None,
-    level: Annotated[
-        float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: adds its columns")
-    ] = None,
+    level: Level = None,
     kind: Kind = None,
     adaptive: Adaptive = None,
 ) -> None:
@@ -58,9 +56,7 @@ def aboard_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="table of every point: .parquet or .csv")] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots")] = None,
-    level: Annotated[
-        float | None, typer.Option(help="share of whole paths that a band is to hold, such as 0.9: shows it")
-    ] = None,
+    level: Level = None,
     kind: Kind = None,
     adaptive: Adaptive = None,
 ) -> None:

@@ -138,8 +138,7 @@ def manoeuvre_command(
         if log is not None:
             source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
             answer.say(f"log -> {shipid.write_dataset(shipid.Dataset(done.frame, source), log)}", log=log)
-        page = write_manoeuvre(manoeuvre_content(done, command_line()), out)
-        answer.say(f"page -> {page}", page=page)
+        answer.say_page(write_manoeuvre(manoeuvre_content(done, command_line()), out))
 
 
 def replay_command(
@@ -149,7 +148,7 @@ def replay_command(
         list[str] | None, typer.Option("--run", help="runs, * for any part of a name; default: all")
     ] = None,
     ahead: Annotated[float, typer.Option(help="s of each simulation; 0: whole runs")] = 0.0,
-    step: Annotated[float, typer.Option(help="s, of the integration")] = 0.1,
+    step: Annotated[float, typer.Option(min=1e-9, help="s, of the integration")] = 0.1,
     commands: Annotated[
         Literal["held", "between"],
         typer.Option(help="held: a command counts from its row to the next; between: it changes between the rows"),
@@ -167,8 +166,6 @@ def replay_command(
     from shipid.report.motion import REPLAYED, ReplayContent, write_replay
 
     file = check_output(out or Path(f"{document_stem(vessel)}-replay.html"), endings=(".html",))
-    if not step > 0:
-        raise ShipidError(f"{step:g} s: must be above 0", path="--step")
     ship, log = shipid.load_vessel(vessel), shipid.read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
     short = too_short(log, chosen, step, ahead)
@@ -208,5 +205,4 @@ def replay_command(
         answer.say("\n".join(filter(None, notes)), assumed=zero, left_out=left_out, gaps=holes, diagnosis=found)
         answer.records("errors", errors, {"run": "run"} | MOTION, MOTION_FORMATS)
         answer.save("motions", csv, replayed.series)
-        page = write_replay(content, file)
-        answer.say(f"page -> {page}", page=page)
+        answer.say_page(write_replay(content, file))

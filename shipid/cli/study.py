@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import closing
+from math import isnan
 from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING, Annotated
@@ -24,10 +25,10 @@ from shipid.cli.options import (
     parse_changes,
 )
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import end_on_interrupt, share_text, show_steps
+from shipid.cli.terminal import end_on_interrupt, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES, quote_argument, write_new
-from shipid.units import level_text, plural_word
+from shipid.units import level_text, percent_text, plural_word
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -346,7 +347,9 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
         | (bands if banded else {})
         | {"verdict": "verdict"}
     )
-    answer.records("errors", errors, heads, dict.fromkeys(bands, share_text))
+    answer.records(
+        "errors", errors, heads, dict.fromkeys(bands, lambda share: "-" if isnan(share) else percent_text(share))
+    )
     answer.say("verdict: lower or higher where the test shows it, corrected for the rows of a run; empty: it does not")
     answer.say("\n".join(compared.notes), notes=compared.notes)
     return errors

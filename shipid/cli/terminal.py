@@ -10,7 +10,6 @@ from contextlib import contextmanager, suppress
 import typer
 
 from shipid.errors import escape_unprintable
-from shipid.units import percent_text
 
 SILENCE = 15.0  # s between lines of a long calculation
 NOTHING = "interrupted: nothing was written"
@@ -31,11 +30,6 @@ def four_digits(value: float, missing: str = "-") -> str:
     if abs(value) >= 1e6:  # a moment on a clock of dates
         return f"{value:.1f}"
     return missing if math.isnan(value) else f"{round(value, 4) + 0.0:.4g}"
-
-
-def share_text(share: float) -> str:
-    """Write a share in percent; a dash where it is NaN."""
-    return "-" if math.isnan(share) else percent_text(share)
 
 
 MOTION = {"u": "u [m/s]", "v": "v [m/s]", "r": "r [deg/s]", "position": "position [m]"}

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
 import shipid
-from shipid.arguments import check_choice
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
 from shipid.cli.outputs import check_output
@@ -62,7 +61,7 @@ def vessel_new(
     length: Annotated[float, typer.Option(help="m, between perpendiculars")],
     beam: Annotated[float, typer.Option(help="m")],
     out: Annotated[Path, typer.Option(help="TOML file to write; an existing file is not overwritten")],
-    kind: Annotated[str, typer.Option(help="ship, or usv: a small craft driven by forces")] = "ship",
+    kind: Annotated[Literal["ship", "usv"], typer.Option(help="usv: a small craft driven by forces")] = "ship",
     draught: Annotated[float | None, typer.Option(help="m, of a ship")] = None,
     block: Annotated[float | None, typer.Option(help="block coefficient of a ship")] = None,
     mass: Annotated[float | None, typer.Option(help="kg, of a usv")] = None,
@@ -104,7 +103,6 @@ def vessel_new(
 
     check_output(out, endings=(".toml",))
     check_values({"name": name or ""}, "vessel new")
-    check_choice("kind", kind, ("ship", "usv"))
     called, of_usv = name or f"First guess, {length:g} m", kind == "usv"
     of_ships: dict[str, Any] = {
         "draught": draught,

@@ -14,10 +14,10 @@ from shipid.data.dataset import (
     Array,
     Dataset,
     clock_slack,
-    cumulative_integral,
     shares_clock,
     stretches_by_run,
     stretches_of_runs,
+    travelled_position,
     unit_of_column,
 )
 from shipid.errors import DataError
@@ -127,11 +127,10 @@ def white_noise_of(values: Array) -> float:
     return float(np.median(np.abs(np.diff(values, 2))) / (0.6745 * np.sqrt(6.0)))
 
 
-def travelled_path(rows: pd.DataFrame) -> Plane:
-    """Integral of u, v, psi from the first row of a stretch, north + i east [m]."""
-    t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
-    rate = (u + 1j * v) * np.exp(1j * psi)
-    return cumulative_integral(t, rate.real) + 1j * cumulative_integral(t, rate.imag)
+def way_not_travelled(rows: pd.DataFrame) -> Plane:
+    """Positions of a stretch less the integral of u, v, psi from its first row, north + i east [m]."""
+    north, east = travelled_position(rows, rows["t"].to_numpy())
+    return (rows["north"] - north + 1j * (rows["east"] - east)).to_numpy()
 
 
 def _drift_of_positions(rows: pd.DataFrame) -> Array:
@@ -139,7 +138,7 @@ def _drift_of_positions(rows: pd.DataFrame) -> Array:
     t = rows["t"].to_numpy()
     part = np.floor((t - t[0]) / DRIFT_SECONDS + 1e-9).astype(int)
     start = np.flatnonzero(np.diff(part, prepend=-1))[np.cumsum(np.diff(part, prepend=-1) > 0) - 1]
-    error = (rows["north"] + 1j * rows["east"]).to_numpy() - travelled_path(rows)
+    error = way_not_travelled(rows)
     return np.asarray(np.abs(error - error[start]))
 
 

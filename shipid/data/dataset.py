@@ -227,6 +227,19 @@ def cumulative_integral(t: Array, rate: Array) -> Array:
     return np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
 
 
+def travelled_position(rows: StretchRows, instants: Array) -> tuple[Array, Array]:
+    """North and east [m] travelled since the first row: trapezoid of R(psi) (u, v), exact between rows too."""
+    t, psi, u, v = (np.asarray(rows[name]) for name in ("t", "psi", "u", "v"))
+    row = np.clip(np.searchsorted(t, instants, side="right") - 1, 0, len(t) - 1)
+
+    def along(rate: Array) -> Array:
+        return np.asarray(
+            cumulative_integral(t, rate)[row] + (instants - t[row]) * (rate[row] + np.interp(instants, t, rate)) / 2
+        )
+
+    return along(u * np.cos(psi) - v * np.sin(psi)), along(u * np.sin(psi) + v * np.cos(psi))
+
+
 def sample_columns(rows: StretchRows, instants: Array) -> dict[str, NDArray[Any]]:
     """Every column of one unbroken stretch at given instants [s] (any shape): name -> array of that shape.
 

@@ -20,7 +20,7 @@ import pandas as pd
 
 from shipid.errors import DivergenceError, ResultError, ShipidError
 from shipid.exchange.ships import Dice, DrawnShip, draw_ship
-from shipid.files import make_folder, read_json, replace_whole, write_json
+from shipid.files import make_folder, read_json, write_json, write_table
 from shipid.metrics import position_error
 from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
 from shipid.study.declared import NO_MODEL
@@ -334,10 +334,8 @@ def run_ships(
         if isinstance(cells, str):
             yield f"{name} is left out: {cells}"
             continue
-        with replace_whole(folder / f"{name}.parquet") as file:
-            cells.to_parquet(file)
+        write_table(folder / f"{name}.parquet", cells)
         (folder / f"{name}.json").unlink(missing_ok=True)
         files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").exists()]
-        with replace_whole(folder / "cells.csv") as file:
-            pd.concat(map(pd.read_parquet, files)).to_csv(file, index=False)
+        write_table(folder / "cells.csv", pd.concat(map(pd.read_parquet, files), ignore_index=True))
         yield f"{name}: {len(cells)} cells; {len(files)} of {len(BUNDLED) + drawn} ships"

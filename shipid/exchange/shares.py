@@ -23,11 +23,10 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from shipid.evidence import ROUNDING, SIGNIFICANT, SMALLEST_ERROR
-from shipid.metrics import vector_lengths
+from shipid.metrics import Array, vector_lengths
 from shipid.report.figure import even_places
 from shipid.study.results import Results
 
-Array = np.ndarray
 ROUNDS = 8  # of Fisher scoring: half as many reach the same digits
 SMALLEST_REST = 1e-6  # of H, in the weights of the members
 MOST_FOLDS = 40  # parts of the members that are left out in turn

@@ -29,7 +29,6 @@ from shipid.simulation.log import state_column
 from shipid.users import error_location, is_user_code, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
 
-Array = np.ndarray
 UNITS_OF_FORCES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
 """Slow force of the observer over the mass -> unit; its other estimates are velocities."""
 MOST_NUMBERS = 300_000

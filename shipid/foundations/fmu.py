@@ -26,7 +26,7 @@ from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
 from shipid.data.windows import Instants, Windows, from_frame, to_frame
 from shipid.engine.fmu_process import FmuCall, FmuRun, run_fmu
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
-from shipid.foundations.faults import doubt_of_rates
+from shipid.foundations.faults import Array, doubt_of_rates
 from shipid.foundations.function import SimulatorFunction
 from shipid.logs.mapping import UNITS
 from shipid.observer import MEASURED_MOTION
@@ -35,7 +35,6 @@ from shipid.units import DEGREE
 
 log = logging.getLogger(__name__)
 
-Array = np.ndarray
 RESPONSE = 120.0  # s of a step response
 EXACT = 0.1  # by which, in a step response, changes may differ from integrals of rates, as a share
 

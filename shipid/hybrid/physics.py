@@ -19,6 +19,7 @@ from shipid.arguments import (
 from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance_loss
+from shipid.engine.integrate import Array
 from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import SPEED_LIMIT, Distances, Trajectories, rollout, rollout_distances
 from shipid.errors import DataError, ShipidError
@@ -29,7 +30,6 @@ from shipid.simulation.log import LEANING, body_velocities, horizontal_velocitie
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
 ESTIMATED = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS)
 REPEATED_FROM = 5_000  # steps of one rollout: who asks for so many at once, in training or on a log, asks again

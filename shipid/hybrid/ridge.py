@@ -24,7 +24,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shipid.data.windows import choose_evenly
+from shipid.data.windows import WindowMask, choose_evenly
 from shipid.hybrid.compensator import Network, smooth_basis
 from shipid.hybrid.features import input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
@@ -40,7 +40,6 @@ from shipid.hybrid.search import (
 )
 from shipid.hybrid.units import Units, VaryingInputs
 
-Mask = NDArray[np.bool_]
 Seeing = tuple[VaryingInputs, Tensor]
 """Windows as hidden units see them: what is seen, and its values (S, d), normalised."""
 
@@ -463,7 +462,7 @@ def _left_out_errors(
     ridges: Sequence[float],
     blocks: Sequence[_FoldBlock],
     terms: int,
-    wanted: Mask | None = None,
+    wanted: WindowMask | None = None,
 ) -> tuple[Array, Array, _LeftOutErrors]:
     """Errors over judged windows, each block without itself.
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from shipid.errors import DataError
 from shipid.measures.record import Array, Record, find_plateaus, first_execute, row_of_release
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_row_of_zigzag
@@ -30,12 +29,7 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     that of the sum of angle times change of yaw rate. The shaft is the mean of the speeds that are not 0 at the start;
     in a stop the slowest of those that are reversed, else stopped. It counts times the pitch over the greatest pitch,
     and that of an azimuth unit turned astern times 1 at 0 deg to -1 at 180 deg.
-
-    DataError for a missing column.
     """
-    missing = next((name for name in RECORD_STATES if name not in columns), None)
-    if missing is not None:
-        raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in RECORD_STATES}
     angles = _commands_that(columns, is_steering)
     known = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ NAN = float("nan")
 HELM_NEVER_MOVED = "the helm is never moved"
 AT_REST = "the ship does not move at the execute"
 CUBIC_SAMPLES = 4  # samples of the interpolating polynomial
-CROSSING_HALVINGS = 60
 TOP_SHARE = 0.2  # share of a rise that is its top
 LEVEL_DRIFT = 1.5  # tolerances by which a level differs from the next one at least
 LEAST_SLOPE = 1e-10  # of the largest coefficient of a fitted slope: smaller ones of higher powers are rounding
@@ -42,7 +41,7 @@ class Record:
     helm : helm as ordered, or as measured, > 0 where it turns the ship to starboard [rad].
     shaft : shaft speed as ordered [rev/s], < 0 also where the pitch drives astern; None where it is not known.
 
-    DataError for rows that are no such arrays, values that are not finite, or time that does not increase.
+    DataError for a single row. Columns are those of a dataset: finite, and in order of time.
     """
 
     t: Array
@@ -56,16 +55,8 @@ class Record:
     shaft: Array | None = None
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            values = getattr(self, one.name)
-            if values is None:
-                continue
-            if values.shape != self.t.shape or values.ndim != 1 or len(values) < 2:
-                raise DataError(f"has the shape {values.shape}: needs (N,) like t, N at least 2", path=one.name)
-            if not np.isfinite(values).all():
-                raise DataError("holds a value that is not finite", path=one.name)
-        if (np.diff(self.t) <= 0).any():
-            raise DataError("does not increase", path="t")
+        if len(self.t) < 2:
+            raise DataError("a single row: a manoeuvre needs two or more", path="t")
         object.__setattr__(self, "psi", np.unwrap(self.psi))
 
     @property
@@ -127,11 +118,10 @@ def time_of_crossing(t: Array, values: Array, level: float, start: float, rising
     after = np.flatnonzero((t > start) & (beyond >= 0))
     if not len(after):
         return NAN
+    from scipy.optimize import brentq  # most commands measure nothing, and it takes its time
+
     low, high = max(float(t[after[0] - 1]), start), float(t[after[0]])
-    for _ in range(CROSSING_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if cubic_value_at(t, beyond, middle) >= 0 else (middle, high)
-    return high
+    return float(brentq(lambda when: cubic_value_at(t, beyond, when), low, high))
 
 
 def maximum_between(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from typing import TypeVar
 
 from shipid.physics import symbols as ca
@@ -207,14 +207,9 @@ def cross_flow_monomial(name: str) -> Monomial:
     return parse_monomial(name, "vr", axes="")
 
 
-def thrust_monomial(name: str) -> Monomial:
+def thrust_monomial(name: str, alphabet: str = "Jyt") -> Monomial:
     """Monomial of a thruster coefficient: factors J, y (J_y) and t (tanh(|J_y| / width)); `1` is the constant term."""
-    return Monomial("", ()) if name == "1" else parse_monomial(name, "Jyt", axes="")
-
-
-def advance_monomial(name: str) -> Monomial:
-    """Monomial of a coefficient of a screw behind a hull: factors J alone; `1` is the constant term."""
-    return Monomial("", ()) if name == "1" else parse_monomial(name, "J", axes="")
+    return Monomial("", ()) if name == "1" else parse_monomial(name, alphabet, axes="")
 
 
 DERIVATIVES = Grammar(hull_derivative, derivative_unit)
@@ -226,4 +221,4 @@ ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit)
 RUDDER_FLOWS = Grammar(rudder_flow, lambda _: "prime")
 CROSS_FLOWS = Grammar(cross_flow_monomial, lambda _: "prime")
 THRUST = Grammar(thrust_monomial, lambda _: "-")
-ADVANCE = Grammar(advance_monomial, lambda _: "-")
+ADVANCE = Grammar(partial(thrust_monomial, alphabet="J"), lambda _: "-")  # of a screw behind a hull: factors J alone

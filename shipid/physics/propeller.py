@@ -76,29 +76,6 @@ def flow_beyond_polynomial(u_P: SX, n: SX, D_p: SX, J_min: SX, J_max: SX) -> SX:
     return ca.sign(u_P) * ca.fmax(u_P**2 - (limit * n * D_p) ** 2, 0)
 
 
-def polynomial_thrust(
-    u_P: SX,
-    n: SX,
-    D_p: SX,
-    K_T: Mapping[str, SX],
-    K_T_astern: Mapping[str, SX] | None,
-    J_min: SX,
-    J_max: SX,
-    k_astern: SX | float,
-    k_drag: SX | float,
-    rho: SX,
-) -> SX:
-    """Thrust [N] of a screw, rho n^2 D_p^4 K_T(J), with its drag beyond J_min..J_max; see `propeller_wrench`."""
-    sense = ca.if_else(n >= 0, 1, -k_astern)
-    K = propeller_thrust_coefficient(u_P, n, D_p, K_T, J_min, J_max)
-    if K_T_astern:
-        K = ca.if_else(n >= 0, K, propeller_thrust_coefficient(u_P, n, D_p, K_T_astern, J_min, J_max))
-    thrust = sense * rho * n**2 * D_p**2 * D_p**2 * K
-    if differs_from_default(k_drag, 0.0):
-        thrust -= k_drag * rho * D_p**2 * flow_beyond_polynomial(u_P, n, D_p, J_min, J_max)
-    return thrust
-
-
 def propeller_wrench(
     nu_r: SX,
     n: SX,
@@ -136,13 +113,17 @@ def propeller_wrench(
     0 < N_astern.
     """
     u_P = propeller_inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    thrust = polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, ca.SX(J_min), ca.SX(J_max), k_astern, k_drag, rho)
+    low, high = ca.SX(J_min), ca.SX(J_max)
+    K = propeller_thrust_coefficient(u_P, n, D_p, K_T, low, high)
+    if K_T_astern:
+        K = ca.if_else(n >= 0, K, propeller_thrust_coefficient(u_P, n, D_p, K_T_astern, low, high))
+    thrust = ca.if_else(n >= 0, 1, -k_astern) * rho * n**2 * D_p**2 * D_p**2 * K
+    if differs_from_default(k_drag, 0.0):
+        thrust -= k_drag * rho * D_p**2 * flow_beyond_polynomial(u_P, n, D_p, low, high)
     wrench = wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
     if Y_astern or N_astern:
         unit = ca.if_else(n >= 0, 0, rho * n**2 * D_p**2 * D_p**2)
-        Y, N = (
-            propeller_thrust_coefficient(u_P, n, D_p, K or {}, ca.SX(J_min), ca.SX(J_max)) for K in (Y_astern, N_astern)
-        )
+        Y, N = (propeller_thrust_coefficient(u_P, n, D_p, table or {}, low, high) for table in (Y_astern, N_astern))
         wrench += unit * column_vector(0, Y, 0, -z * Y, 0, D_p * N)
     return wrench
 

@@ -148,12 +148,9 @@ class Controls:
 
 def helm_effect(controls: Controls, n: float, u: float) -> float:
     """Yaw acceleration per helm angle [1/s^2] at shaft speed n [rev/s] and speed u [m/s]."""
-    yaw = [
-        straight_acceleration(
-            controls.vessel, u, {name: float(order[0]) for name, order in controls.orders(*given).items()}
-        )[2]
-        for given in ((np.full(1, n), np.full(1, angle)) for angle in (0.0, PROBE_HELM))
-    ]
+    running = controls.ahead(n)
+    turned = running | {name: sign * PROBE_HELM for name, sign in controls.helm.items()}
+    yaw = [straight_acceleration(controls.vessel, u, orders)[2] for orders in (running, turned)]
     return float(yaw[1] - yaw[0]) / PROBE_HELM
 
 
@@ -280,8 +277,7 @@ def _length_or_usual(vessel: Vessel) -> float:
 
 def _steady_speed(controls: Controls, n: float) -> float:
     """Speed ahead [m/s] at which the surge acceleration is 0, at shaft speed n [rev/s] and helm amidships."""
-    orders = {name: float(order[0]) for name, order in controls.orders(np.full(1, n), np.zeros(1)).items()}
-    return _balanced_speed(controls.vessel, orders)
+    return _balanced_speed(controls.vessel, controls.ahead(n))
 
 
 def _balanced_speed(vessel: Vessel, orders: Mapping[str, float]) -> float:

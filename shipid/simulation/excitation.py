@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shipid.errors import DocumentError
 from shipid.vessel.perturb import uniform_draw
+from shipid.vessel.stability import bisect_root
 
 Array = NDArray[np.float64]
 
@@ -117,10 +118,7 @@ def _shift_to_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
     wave = _one_period(harmonics, phi)
     rising = int(np.flatnonzero((wave <= 0) & (np.roll(wave, -1) > 0))[0])
     low, high = 2 * np.pi * rising / len(wave), 2 * np.pi * (rising + 1) / len(wave)
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if np.sin(harmonics * middle + phi).sum() <= 0 else (low, middle)
-    return phi + harmonics * low
+    return phi + harmonics * bisect_root(lambda angle: float(np.sin(harmonics * angle + phi).sum()), low, high)
 
 
 def _stratified_draws(count: int, key: tuple[object, ...]) -> Array:

@@ -155,10 +155,8 @@ class VesselFamily(NotebookView, shown=("rules.name", "base.name", "rules.member
     def export(self, folder: str | Path) -> Path:
         """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock.
 
-        DataError, and nothing is written, where one of these files exists, or the folder is a file.
+        DataError, and nothing is written, where one of these files exists; OSError where the folder is a file.
         """
-        if Path(folder).is_file():
-            raise DataError("is a file: name a folder", file=folder)
         base, lock = str(self.rules.base), Path(folder) / f"{self.rules.name}.lock.toml"
         base = os.path.relpath(self.base.file, folder) if base.endswith(".toml") else base
         patches = {Path(folder) / f"{one.name}.toml": replace(one, base=base).document() for one in self.members}

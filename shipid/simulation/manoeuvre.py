@@ -411,8 +411,9 @@ class Spiral(Trial):
     @classmethod
     def scaled(cls, request: Request) -> Self:
         """There and back on 29 levels of 40 ship lengths, or more: until the turn of a stable ship is steady."""
-        there = [request.sense * request.angle(HELMS[0]) / HELMS[0] * helm for helm in HELMS]
-        hold = request.level(request.settling(LEVEL) if request.duration is None else LEVEL)
+        sense = 1.0 if request.side == "starboard" else -1.0
+        there = [sense * request.angle(HELMS[0]) / HELMS[0] * helm for helm in HELMS]
+        hold = request.settling(LEVEL) * request.passing if request.duration is None else request.duration
         return cls(angles_deg=(*there, *there[-2::-1]), hold=hold, **request.keys)
 
     def title(self, words: str) -> str:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from shipid.arguments import as_float_array, as_names, check_choice, check_mapping, check_positive, whole_steps
 from shipid.engine.casadi import evaluate_samples
-from shipid.engine.engines import engine_by_name
 from shipid.engine.integrate import Array, Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, suggest_name
@@ -76,7 +75,7 @@ def perform_manoeuvres(
     check_mapping("environment", environment, "a name to a number or an array")
     weather = _environment_series(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
     check_choice("method", method, get_args(Method))
-    engine_by_name(engine, "cpu")
+
     seas = _check_components({} if components is None else components, len(manoeuvres))
     outputs = as_names("outputs", outputs)
     for name in outputs:

@@ -36,11 +36,6 @@ class Request:
     interval: float
     keys: Mapping[str, Any]
 
-    @property
-    def sense(self) -> float:
-        """+1 where the first turn is to starboard, -1 to port."""
-        return 1.0 if self.side == "starboard" else -1.0
-
     def angle(self, default: float, place: int = 0) -> float:
         """The angle at a place of those given, else the default, in the unit of the kind."""
         return self.angles[place] if place < len(self.angles) else default
@@ -48,10 +43,6 @@ class Request:
     def time(self, lengths: float) -> float:
         """Length of the log [s]: as asked, else a number of ship lengths after the first order."""
         return self.keys["execute_at"] + lengths * self.passing if self.duration is None else self.duration
-
-    def level(self, lengths: float) -> float:
-        """Time of a level [s]: as asked, else for a number of ship lengths."""
-        return lengths * self.passing if self.duration is None else self.duration
 
     def settling(self, least: float) -> float:
         """Ship lengths until a turn is steady, `least` or more: the rate of a nearly neutral ship takes long.

@@ -17,7 +17,7 @@ from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import missing_columns
-from shipid.predictor import Predictor
+from shipid.predictor import Array, Predictor
 from shipid.report.content import SummaryLine
 from shipid.study.apply import (
     BandSettings,
@@ -33,7 +33,6 @@ from shipid.study.apply import (
 from shipid.study.store import read_predictor
 from shipid.units import length_text, level_text, percent_text, plural_word
 
-Array = np.ndarray
 TRACK_COLUMNS = ["run", "t", "north", "east"]
 MOMENTS_OF_SUMMARY = np.linspace(0.0, 1.0, 5)  # of the horizon
 SHIP_CHANGED = "the ship, its loading or the weather is not that of the training, and bands do not hold"

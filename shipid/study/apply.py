@@ -37,14 +37,13 @@ from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.metrics import summarise_errors
-from shipid.observer import run_observer
+from shipid.observer import Array, run_observer
 from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
 from shipid.units import length_text, percent_text, plural_word
 from shipid.vessel.load import Vessel
 
-Array = np.ndarray
 NO_PATH_ALONE = "a mean of foundations has no physics of its own: its path of physics alone is empty"
 COOPERATIVE_COLUMNS = ("cooperative_north", "cooperative_east")
 

@@ -57,7 +57,7 @@ from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
 from shipid.logs.segments import run_kind
 from shipid.metrics import position_error
-from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
+from shipid.observer import Array, Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import Truth, draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
@@ -68,7 +68,6 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw_variant
 
-Array = np.ndarray
 Pair = tuple[Array, Array]
 MOST_REDRAWS = 100
 

@@ -13,13 +13,12 @@ import pandas as pd
 from shipid.data.windows import constant_motion
 from shipid.errors import DataError
 from shipid.files import write_table
-from shipid.foundations.faults import doubt_of_places, errors_at_steps, path_of_places
+from shipid.foundations.faults import Array, doubt_of_places, errors_at_steps, path_of_places
 from shipid.foundations.predictions import ordered_places, read_prediction_frame
 from shipid.study.plan import grid_seeds
 from shipid.study.results import Results
 from shipid.study.windows import TRUTH_RECORD
 
-Array = np.ndarray
 SCORES = "scores"  # folder in that of a run, of the tables that were scored
 
 

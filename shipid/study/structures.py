@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import tomlkit
-from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset
@@ -53,7 +52,6 @@ from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import UNUSUAL, find_contradictions
 
-Array = NDArray[np.float64]
 SayStep = Callable[[str], object]
 STRUCTURE_FOLDS = 3
 SIDES_OF_TRIALS = ("starboard", "port")

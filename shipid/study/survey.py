@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from shipid.data.checks import check_dataset, travelled_path
+from shipid.data.checks import check_dataset, way_not_travelled
 from shipid.data.dataset import Dataset, stretches_by_run, stretches_of_runs
 from shipid.physics.signals import is_steering
 from shipid.study.prepare import kinds_of_runs, longest_piece
@@ -63,7 +63,7 @@ def separation_of_sources(dataset: Dataset, lag: float) -> float:
     parted = []
     for _, rows in stretches_of_runs(dataset):
         t = rows["t"].to_numpy()
-        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - travelled_path(rows)
+        apart = way_not_travelled(rows)
         early = t <= t[-1] - lag
         parted.append(np.interp(t[early] + lag, t, apart) - apart[early])
     every = np.abs(np.concatenate(parted))

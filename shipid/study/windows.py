@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.arguments import check_choice
-from shipid.data.dataset import read_dataset
+from shipid.data.dataset import Array, read_dataset
 from shipid.data.windows import Windows, join_windows
 from shipid.errors import ShipidError
 from shipid.files import write_json, write_table
@@ -27,7 +27,6 @@ from shipid.study.cells import predictions
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import obtain_runs, prepare, steps_before
 
-Array = np.ndarray
 TRUTH_RECORD = "test-truth.json"  # in the folder of a run whose test windows went out with their future
 
 

@@ -145,11 +145,25 @@ def _assemble_dynamics(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         if (bind_document(vessel.document), parameter_units(vessel.document)) != (vessel.bound, vessel.units):
             raise ShipidError("its terms take other numbers than when it was read: load it again", file=vessel.file)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
-    hidden = _hidden_states(terms)
-    ordered = _command_names(terms)
+    hidden = {
+        path: [f"{path}.{name}" for name in term_states(key, block)]
+        for path, key, block in terms
+        if TERMS[key].states is not None
+    }
+    known = rows_of_role("command")
+    ordered = tuple(
+        f"{path.rsplit('.', 1)[-1]}.{signal}"  # `port.n`, by the last part of the path of the block
+        for path, key, _ in terms
+        for signal in function_signals(TERMS[key].function)
+        if signal in known
+    )
     state, state_of = _named_symbols("state", [*names, *(name for entries in hidden.values() for name in entries)])
     commands, input_of = _named_symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
-    environment, weather = _named_symbols("environment", _needed_environment(vessel))
+    wanted = {name for _, key, _ in terms for name in function_signals(TERMS[key].function)}
+    wanted |= {"V_c", "beta_c"} if "current" in vessel.document else set()
+    environment, weather = _named_symbols(
+        "environment", [name for name in rows_of_role("environment") if name in wanted]
+    )
     parameters, value_of = _named_symbols("parameters", list(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
     bound = vessel.bound
@@ -223,16 +237,6 @@ def _assemble_dynamics(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     )
 
 
-def _command_names(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[str, ...]:
-    """Commands of the terms, named by the last part of the path of the block: `port.n`."""
-    return tuple(
-        f"{path.rsplit('.', 1)[-1]}.{signal}"
-        for path, key, _ in terms
-        for signal in function_signals(TERMS[key].function)
-        if signal in rows_of_role("command")
-    )
-
-
 def _added_mass_force(M_A: SX, nu_r: SX, kept: tuple[int, ...]) -> SX:
     """Force (6) of added mass beyond -M_A d(nu_r)/dt.
 
@@ -253,12 +257,6 @@ def _upright_correction(eta: SX, nu: SX, m: SX) -> SX:
     """
     h = heave_rate(eta, nu)
     return column_vector(m * nu[4] * h, -m * nu[3] * h, 0, 0, 0, 0)
-
-
-def _hidden_states(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:
-    """Path of each term with additional states -> their names, `path.name`."""
-    found = {path: term_states(key, block) for path, key, block in terms}
-    return {path: [f"{path}.{name}" for name in names] for path, names in found.items() if names}
 
 
 def _state_rates(
@@ -393,14 +391,6 @@ def _term_wrench(key: str, available: Mapping[str, SX], keywords: Mapping[str, A
     return check_returned(key, function, value, given, 6, "a wrench (6)")
 
 
-def _needed_environment(vessel: Vessel) -> tuple[str, ...]:
-    """Environment channels that the terms of a vessel need."""
-    wanted = {name for _, key, _ in term_blocks(vessel.document) for name in function_signals(TERMS[key].function)}
-    if "current" in vessel.document:
-        wanted |= {"V_c", "beta_c"}
-    return tuple(name for name in rows_of_role("environment") if name in wanted)
-
-
 def _assemble_actuators(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     bound: Mapping[str, Binding],
@@ -428,12 +418,10 @@ def _symbol_arguments(binding: Binding, value_of: Mapping[str, SX]) -> dict[str,
     """Keyword arguments of a physics function, with paths replaced by their symbols."""
 
     def resolve(target: Any) -> Any:
-        if isinstance(target, str):
-            return value_of[target]
         if isinstance(target, list):
             return [value_of[path] for path in target]
         if isinstance(target, dict):
             return {key: value_of[path] for key, path in target.items()}
-        return target
+        return value_of[target] if isinstance(target, str) else target
 
     return {keyword: resolve(target) for keyword, target in binding.items()}

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-LONGEST_CHAIN = 20  # documents that extend or patch one another
+FOUR_QUADRANT = "thruster.four_quadrant"
 MOST_BLOCK = 2.0  # m / (rho L_pp B T), as `LEAST_BLOCK`: far beyond any ship and its degraded models
 
 
@@ -240,10 +240,6 @@ def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Pat
         other = documents.find_document(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
-    if len(above) >= LONGEST_CHAIN:
-        raise DocumentError(
-            f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out", file=file, path=path
-        )
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
@@ -314,9 +310,7 @@ def check_document(document: Document, file: str) -> Vessel:
 def _check_numbers(vessel: Vessel) -> None:
     """Checks of the values of a document whose names are valid."""
     for path, key, block in term_blocks(vessel.document):
-        _check_order(path, block, vessel.file)
-        if key == "thruster.four_quadrant":
-            _check_circle(path, block, vessel.file)
+        _check_rising_angles(path, key, block, vessel.file)
     _check_inertia(vessel)
     _check_sense(vessel)
     fault = out_of_range(vessel.document, vessel.parameters, vessel.units)
@@ -364,16 +358,13 @@ def _check_sense(vessel: Vessel) -> None:
             )
 
 
-def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
-    for key, value in block.items():
-        if isinstance(value, list) and key.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
-            raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{key}")
-
-
-def _check_circle(path: str, block: Mapping[str, Any], file: str) -> None:
-    """DocumentError for a propeller in four quadrants whose table has a gap at 180 deg."""
-    beta, thrust = block["beta_deg"], block["C_T"]
-    if (beta[0], beta[-1]) != (-180, 180) or thrust[0] != thrust[-1]:
+def _check_rising_angles(path: str, key: str, block: Mapping[str, Any], file: str) -> None:
+    """DocumentError for angles that do not rise; of a propeller in four quadrants for a gap at 180 deg, too."""
+    for name, value in block.items():
+        if isinstance(value, list) and name.endswith("_deg") and any(b <= a for a, b in pairwise(value)):
+            raise DocumentError("must rise from entry to entry", file=file, path=f"{path}.{name}")
+    ends = [block[name][end] for name in ("beta_deg", "C_T") for end in (0, -1)] if key == FOUR_QUADRANT else []
+    if ends and (ends[:2] != [-180, 180] or ends[2] != ends[3]):
         raise DocumentError("must go from -180 to 180, where C_T must be the same", file=file, path=f"{path}.beta_deg")
 
 

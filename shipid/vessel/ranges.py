@@ -42,53 +42,49 @@ class ShipSize:
 class MagnitudeRange:
     """Least and greatest magnitude of a number, and what it should be, in words."""
 
-    least: Callable[[ShipSize], float]
     most: Callable[[ShipSize], float]
     words: str
-
-
-def _upper_range(most: Callable[[ShipSize], float], words: str) -> MagnitudeRange:
-    return MagnitudeRange(lambda _: 0.0, most, words)
+    least: Callable[[ShipSize], float] = lambda _: 0.0
 
 
 _NAMED: dict[str, MagnitudeRange] = {
     "particulars.L_pp": MagnitudeRange(
-        lambda _: 0.05, lambda _: 600.0, "a length between perpendiculars of 0.05 to 600 m"
+        lambda _: 600.0, "a length between perpendiculars of 0.05 to 600 m", lambda _: 0.05
     ),
     "inertia.m": MagnitudeRange(
-        lambda s: 1e-4 * WATER * s.L**3, lambda s: 0.5 * WATER * s.L**3, "a mass of 0.0001 to 0.5 rho L^3 in kg"
+        lambda s: 0.5 * WATER * s.L**3, "a mass of 0.0001 to 0.5 rho L^3 in kg", lambda s: 1e-4 * WATER * s.L**3
     ),
     **{
         f"inertia.I_{axis}": MagnitudeRange(
-            lambda s: s.m * (0.01 * s.L) ** 2, lambda s: s.m * s.L**2, "a radius of gyration of 0.01 to 1 ship length"
+            lambda s: s.m * s.L**2, "a radius of gyration of 0.01 to 1 ship length", lambda s: s.m * (0.01 * s.L) ** 2
         )
         for axis in "xyz"
     },
-    "constants.rho": MagnitudeRange(lambda _: 500.0, lambda _: 3000.0, "a density of water in kg/m^3"),
-    "constants.rho_a": MagnitudeRange(lambda _: 0.01, lambda _: 100.0, "a density of air in kg/m^3"),
-    "constants.g": MagnitudeRange(lambda _: 0.1, lambda _: 100.0, "an acceleration in m/s^2"),
+    "constants.rho": MagnitudeRange(lambda _: 3000.0, "a density of water in kg/m^3", lambda _: 500.0),
+    "constants.rho_a": MagnitudeRange(lambda _: 100.0, "a density of air in kg/m^3", lambda _: 0.01),
+    "constants.g": MagnitudeRange(lambda _: 100.0, "an acceleration in m/s^2", lambda _: 0.1),
 }
 _BY_UNIT: dict[str, MagnitudeRange] = {
-    "m": _upper_range(lambda s: 5 * s.L, "at most 5 ship lengths, in m"),
-    "m^2": _upper_range(lambda s: 10 * s.L**2, "at most 10 squares of the ship length, in m^2"),
-    "m^3": _upper_range(lambda s: 10 * s.L**3, "at most 10 cubes of the ship length, in m^3"),
-    "s": _upper_range(lambda _: 1e4, "at most 10,000 s"),
-    "deg": _upper_range(lambda _: 360.0, "an angle of at most 360 deg"),
-    "rad": _upper_range(lambda _: 7.0, "an angle of at most a full turn in rad"),
-    "m s^-1": _upper_range(lambda _: 100.0, "a speed of at most 100 m/s"),
-    "-": _upper_range(lambda _: 100.0, "without unit, at most 100"),
+    "m": MagnitudeRange(lambda s: 5 * s.L, "at most 5 ship lengths, in m"),
+    "m^2": MagnitudeRange(lambda s: 10 * s.L**2, "at most 10 squares of the ship length, in m^2"),
+    "m^3": MagnitudeRange(lambda s: 10 * s.L**3, "at most 10 cubes of the ship length, in m^3"),
+    "s": MagnitudeRange(lambda _: 1e4, "at most 10,000 s"),
+    "deg": MagnitudeRange(lambda _: 360.0, "an angle of at most 360 deg"),
+    "rad": MagnitudeRange(lambda _: 7.0, "an angle of at most a full turn in rad"),
+    "m s^-1": MagnitudeRange(lambda _: 100.0, "a speed of at most 100 m/s"),
+    "-": MagnitudeRange(lambda _: 100.0, "without unit, at most 100"),
     **dict.fromkeys(
-        ("prime", "bis"), _upper_range(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)")
+        ("prime", "bis"), MagnitudeRange(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)")
     ),
 }
 _BY_NAME: dict[str, MagnitudeRange] = {
-    "D_p": _upper_range(lambda s: 0.3 * s.L, "a diameter of at most 0.3 ship lengths, in m"),
-    "A_R": _upper_range(lambda s: 0.05 * s.L**2, "a rudder of at most 0.05 squares of the ship length, in m^2"),
+    "D_p": MagnitudeRange(lambda s: 0.3 * s.L, "a diameter of at most 0.3 ship lengths, in m"),
+    "A_R": MagnitudeRange(lambda s: 0.05 * s.L**2, "a rudder of at most 0.05 squares of the ship length, in m^2"),
 }
 _ADDED: dict[str, MagnitudeRange] = {
-    "kg": _upper_range(lambda s: 20 * s.m, "at most 20 times the mass"),
-    "kg m": _upper_range(lambda s: 20 * s.m * s.L, "at most 20 times mass times length"),
-    "kg m^2": _upper_range(lambda s: 20 * s.m * s.L**2, "at most 20 times mass times length squared"),
+    "kg": MagnitudeRange(lambda s: 20 * s.m, "at most 20 times the mass"),
+    "kg m": MagnitudeRange(lambda s: 20 * s.m * s.L, "at most 20 times mass times length"),
+    "kg m^2": MagnitudeRange(lambda s: 20 * s.m * s.L**2, "at most 20 times mass times length squared"),
 }
 
 

@@ -248,10 +248,6 @@ def _number_type(parameter: Parameter) -> Any:
     return Annotated[FiniteFloat, Field(gt=0)] if parameter.positive else FiniteFloat
 
 
-def _table_type(grammar: Grammar) -> Any:
-    return Annotated[dict[str, FiniteFloat], AfterValidator(grammar.check)]
-
-
 def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[VesselBlock]:
     """Pydantic model of the block that feeds a physics function; `extra` fields go beside its parameters."""
     fields: dict[str, Any] = dict(extra)
@@ -270,16 +266,15 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
                 ...,
             )
         elif isinstance(parameter.unit, Grammar):
-            table = _table_type(parameter.unit)
+            table: Any = Annotated[dict[str, FiniteFloat], AfterValidator(parameter.unit.check)]
             fields[parameter.name] = (
                 (Annotated[table | None, note], None) if parameter.optional else (Annotated[table, note], ...)
             )
         elif parameter.name in SHARED:
             fields[parameter.name] = (Annotated[_number_type(parameter) | None, note], None)
-        elif parameter.default is not None:
-            fields[parameter.name] = (Annotated[_number_type(parameter), note], parameter.default)
         else:
-            fields[parameter.name] = (Annotated[_number_type(parameter), note], ...)
+            default = ... if parameter.default is None else parameter.default
+            fields[parameter.name] = (Annotated[_number_type(parameter), note], default)
     return create_model(name, __base__=VesselBlock, __cls_kwargs__=config, __validators__=validators, **fields)
 
 

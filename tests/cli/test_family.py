@@ -50,7 +50,7 @@ def test_the_way_of_a_family(tmp_path: Path) -> None:
     assert differences["rules"] == [{"what": "rules.seed", "one": 2, "other": 3}]
     assert differences["numbers"] == [], "the lock still holds those of its old seed"
     code, _, error = ended("family", "export", file, "--family", "high", "--out", lock)
-    assert (code, error.count("\n"), "is a file: name a folder" in error) == (1, 1, True)
+    assert (code, error.count("\n"), "File exists" in error) == (1, 1, True)
     assert "choose one of nominal, moderate, high" in ended("family", "export", file, "--out", tmp_path)[2]
 
 

@@ -54,7 +54,6 @@ def test_the_vessel_that_made_a_run_repeats_it(log: Path, tmp_path: Path) -> Non
     [
         (["--run", "zz 30"], "is no run"),
         (["--out", "page.txt"], "let the name end in .html"),
-        (["--step", "-1"], "-1 s: must be above 0"),
         (["--step", "1e-7"], "steps of these runs, at most 1e+07: give a longer step"),
         (["--step", "30", "--ahead", "20"], "must hold two steps of 30 s"),
         (["--csv", "both.doc"], "csv"),

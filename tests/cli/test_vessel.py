@@ -69,7 +69,6 @@ def test_a_new_craft_from_its_thrusters(tmp_path: Path) -> None:
         (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--rpm", 90), "--rpm: is for a ship: leave it out"),
         (("--kind", "ship", "--mass", 80, "--draught", 1, "--block", 0.5), "--mass: is for a usv: leave it out"),
         (("--kind", "ship", "--block", 0.5), "--draught: missing: a ship needs it"),
-        (("--kind", "boat"), "boat"),
         (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--ship-type", "tanker"), "--ship-type: is for a ship"),
         (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--propulsor", "azimuth"), "--propulsor: is for a ship"),
         (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--tunnel-thruster"), "--tunnel-thruster: is for a ship"),

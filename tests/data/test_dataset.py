@@ -177,14 +177,6 @@ def test_sample_holds_commands_and_interpolates_states() -> None:
     np.testing.assert_array_equal(values["port.n"], [[1.0, 3.0], [2.0, 3.0]])
 
 
-@pytest.mark.parametrize("start", [0.0, 1.7e9])
-def test_sample_takes_no_command_from_the_future(start: float) -> None:
-    rows = turning(start + T).assign(**{"port.n": np.arange(len(T), dtype=float)})
-    offsets = np.array([0.0, 0.25, 0.499, 0.5, 7.1, 19.4])
-    values = sample_columns(rows, start + offsets)["port.n"]
-    np.testing.assert_array_equal(values, [0.0, 0.0, 0.0, 1.0, 14.0, 38.0])
-
-
 def test_sample_finds_the_row_that_rounding_moved() -> None:
     """At Unix time doubles lie 2.4e-7 s apart: start + 0.1 k and start + k / 10 are two numbers for some k."""
     k = np.arange(1000)
@@ -192,13 +184,6 @@ def test_sample_finds_the_row_that_rounding_moved() -> None:
     np.testing.assert_array_equal(sample_columns(rows, 1.7e9 + 0.3 + 0.1 * k[:900])["port.n"], k[3:903])
     alone = sample_columns(rows.iloc[:1], np.array([1.7e9, 1.7e9 + 5.0]))
     np.testing.assert_array_equal(alone["port.n"], [0.0, 0.0])
-
-
-def test_metadata_that_no_file_can_hold_are_refused(tmp_path: Path) -> None:
-    frame = as_dataset(turning(T)).frame
-    with pytest.raises(DataError, match=r"the metadata must be plain data, as JSON holds it \(.*int64"):
-        write_dataset(Dataset(frame, {"flags": ["break"], "rows": np.int64(3)}), tmp_path / "x.parquet")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("seed", range(5))

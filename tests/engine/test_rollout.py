@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import torch
 
 from shipid.engine.integrate import Method
 from shipid.engine.native import find_compiler
@@ -266,16 +265,6 @@ def marked(vessel: Vessel) -> dict[str, dict[str, np.ndarray]]:
         group: {name: np.array([1.0, 2.0]) / 8 + number / 64 for number, name in enumerate(channels)}
         for group, channels in names.items()
     }
-
-
-LOOKS: dict[str, Callable[[np.ndarray], Any]] = {
-    "list": list,
-    "series with another index": lambda values: pd.Series(values, index=range(len(values))[::-1]),
-    "tensor": torch.tensor,
-    "single": np.float32,
-    "every other": lambda values: np.repeat(values, 2)[::2],
-    "objects": lambda values: values.astype(object),
-}
 
 
 def test_parameters_with_names_are_taken_by_name() -> None:

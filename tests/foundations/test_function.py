@@ -183,13 +183,6 @@ def test_what_needs_equations_is_refused(tmp_path: Path, more: str, words: str) 
         shipid.read_plan(study_file(tmp_path, families), trust=True)
 
 
-@pytest.mark.parametrize("kind", ["modules", "learned-force"])
-def test_a_method_that_needs_equations_is_refused(tmp_path: Path, kind: str) -> None:
-    methods = f'[[method]]\nname = "{kind}"\nkind = "{kind}"\n[[method]]\nname = "alone"\nkind = "alone"\n'
-    with pytest.raises(DocumentError, match=f"mine with {kind}: the method needs the equations of a vessel"):
-        shipid.read_plan(study_file(tmp_path, FAMILY.format("my_ship:simulate"), methods=methods), trust=True)
-
-
 def test_no_states_are_refused() -> None:
     one = SimulatorFunction("mine", given=lambda *_: "none")
     with pytest.raises(DataError, match="states of mine"):

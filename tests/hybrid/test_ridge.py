@@ -28,7 +28,6 @@ RUDDER = ("engine.n", "rudder.delta")
 SMALL = PathDrawn(trials=6, units=24, terms=4)
 STEPS, LENGTHS = 9, (18, 25, 18, 30, 11, 18)  # windows of the runs
 ALL = np.arange(sum(LENGTHS))
-EVERY = slice(None)  # column
 ENDS = np.cumsum(LENGTHS)
 RUNS = [np.arange(end - length, end) for length, end in zip(LENGTHS, ENDS, strict=True)]
 FOLDS = [(np.setdiff1d(ALL, run), run) for run in RUNS]

@@ -104,7 +104,6 @@ MISTAKES = {
     "unknown nuisance": (["--parameters", ONE, "--nuisance", "currents"], "did you mean 'current'?"),
     "unknown key": (["--parameters", ONE, "--set", "horizn=3"], "unknown key: did you mean 'horizon'?"),
     "profile of what is not free": (["--parameters", ONE, "--profile", "inertia.m"], "is not free in the fit"),
-    "band of 90": (["--parameters", ONE, "--band", "90"], "--band: 90: must be between 0 and 1, such as 0.9"),
     "no patch": (["--parameters", ONE, "--out", "patch.json"], "let the name end in .toml"),
     "patch is there": (["--parameters", ONE, "--out", "there.toml"], "not written over"),
     "no page": (["--parameters", ONE, "--html", "page.htm"], "let the name end in .html"),

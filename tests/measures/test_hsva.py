@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.measures.criteria import judge_criteria
 from shipid.measures.recognise import recognise_kinds, record_of
 from shipid.measures.zigzag import zigzag_measures
 from shipid.units import DEGREE
@@ -42,11 +41,3 @@ def test_every_zigzag_is_recognised_with_its_execute_heading(hsva: Dataset, name
     record = record_of(columns_of(hsva, name))
     assert recognise_kinds(record) == (("zigzag",), "")
     assert zigzag_measures(record)["execute_heading"].value == pytest.approx(heading * DEGREE)
-
-
-def test_a_short_log_leaves_measures_out_with_a_sentence(hsva: Dataset) -> None:
-    measures = zigzag_measures(record_of(columns_of(hsva, "10_10_P")))
-    assert np.isnan(measures["period"].value)
-    assert measures["period"].why == "the log ends before the fourth execute"
-    judged = {one.name: one for one in judge_criteria("zigzag", measures, 7.0)}
-    assert judged["yaw checking: 10/10 first overshoot (5.3.3.1)"].met is True  # 9.7 against 10 at L/V = 6 s

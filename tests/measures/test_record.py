@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from shipid.errors import DataError
 from shipid.measures.record import (
     cubic_value_at,
     find_plateaus,
@@ -18,7 +15,6 @@ from shipid.measures.record import (
     start_of_change,
     time_of_crossing,
 )
-from tests.measures.made_records import every, stopped
 
 T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
 
@@ -124,13 +120,3 @@ def test_plateaus_are_distinguished_from_the_way_between_them() -> None:
     levels = find_plateaus(t, values, 0.1)
     assert [round(values[b]) for _, b in levels] == [5, 0, -5]
     assert [t[b] for _, b in levels] == [30.0, 60.0, 89.5]  # a row at the jump belongs to both
-
-
-@pytest.mark.parametrize(
-    ("name", "spoil"),
-    [("u", lambda x: x[:-1]), ("psi", lambda x: np.where(x == x[3], np.nan, x)), ("t", lambda x: x[::-1])],
-)
-def test_what_is_no_record_is_refused_by_name(name: str, spoil) -> None:  # type: ignore[no-untyped-def]
-    record = every(stopped(), 1.0)
-    with pytest.raises(DataError, match=f"^{name}: "):
-        replace(record, **{name: spoil(getattr(record, name))})

@@ -18,13 +18,6 @@ def dm(values: Any) -> ca.SX:
     return ca.SX(ca.DM(values))
 
 
-@pytest.mark.parametrize("seed", seeds(2, 5))
-def test_rotation_is_orthonormal_and_right_handed(seed: int) -> None:
-    R = numbers(rotation_matrix(*np.random.default_rng(seed).uniform(-1.5, 1.5, 3)))
-    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
-    assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-14)
-
-
 def test_rotation_is_yaw_then_pitch_then_roll() -> None:
     phi, theta, psi = 0.3, -0.2, 1.1
 

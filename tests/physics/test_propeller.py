@@ -206,11 +206,6 @@ def test_race_of_a_controllable_pitch_propeller_is_momentum_theory() -> None:
     assert flow(10.4, -0.5)[1] == 0  # drives astern, and takes all the flow
 
 
-FLOW: dict[str, Any] = {**WAKE, "x": -3.36, "y": 0.4, "tau": 0.2, "C_P": 0.3}
-DRIVEN: dict[str, Any] = {"T_nn": 3.6e-3, "T_nu": 1.5e-4, "T_uu": 0.2, "k_astern": 1.4, "dT_nu": 3e-4, "k_driven": 0.3}
-CURVE: dict[str, Any] = {"beta_deg": [-180.0, -60.0, 20.0, 110.0, 180.0], "C_T": [-0.5, -0.7, 0.9, 0.4, -0.5]}
-
-
 @pytest.mark.parametrize("u", [1.0, 0.0, -0.6])
 def test_astern_thrust_has_a_separate_curve(u: float) -> None:
     """X = -(1 - t_P) k_astern rho n^2 D^4 K(J), J = 0.6 u / (n D), negative on a ship that still goes ahead."""

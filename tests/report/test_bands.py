@@ -12,8 +12,6 @@ from shipid.report.page import draw_sections
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 
-NASTY = "<b>wrong</b>"
-
 
 @pytest.fixture
 def banded(simulation: ReportContent) -> ReportContent:

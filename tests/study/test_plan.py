@@ -40,7 +40,6 @@ from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
 
 ROOT = Path(__file__).parents[2]
-PACKAGE = ROOT / "shipid"
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,6 @@ from tests.study.test_commands import weaving
 from tests.study.tiny import logged, physics_errors, run_here, tiny_plan, whole_unit
 
 SHIP = load_vessel("gunnerus-28.9")
-ONE_FAMILY = {"name": "right", "base": "gunnerus-28.9"}
 
 
 @pytest.fixture(scope="module")

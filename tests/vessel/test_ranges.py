@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import load_vessel
 from shipid.vessel.template import Particulars, first_guess
 
 NONSENSE: dict[str, tuple[str, Any]] = {
@@ -42,10 +42,6 @@ def test_the_remedy_of_the_message_helps(path: str) -> None:
     word = re.search(r'write unusual = \["(.*?)"\]', str(caught.value))
     assert word is not None
     assert ship.with_values({path: 1.2e7, "unusual": [word[1]]}).document["unusual"] == [word[1]]
-
-
-def test_every_bundled_vessel_is_usual(bundled_vessel: Vessel) -> None:
-    assert "unusual" not in bundled_vessel.document
 
 
 CONTRADICTIONS: dict[str, tuple[str, float, str]] = {

@@ -9,10 +9,8 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from shipid.document import value_at_path
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS, Term
-from shipid.physics.signals import rows_of_role
+from shipid.physics import ACTUATORS, TERMS, Term
 from shipid.units import unit_fault
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -23,28 +21,10 @@ from shipid.vessel.schema import (
     function_signals,
     parameter_units,
     split_keys,
-    structural_keys,
     term_parameters,
 )
 from tests.cli.running import ended
 from tests.documented import code
-
-
-@pytest.mark.parametrize("key", list(TERMS))
-def test_every_argument_of_a_term_is_declared(key: str) -> None:
-    """Positional arguments are signals or component arrays; keyword-only ones have a unit."""
-    term = TERMS[key]
-    given = {*MOTION, *rows_of_role("command"), *rows_of_role("environment")}
-    source = term.components or term.drawn
-    if source is not None:
-        given |= set(source(**dict.fromkeys(structural_keys(term), 3)))
-    given |= set(GIVEN)
-    if term.rates is not None:
-        assert term.states is not None
-        assert set(function_signals(term.rates)) <= given
-    assert set(function_signals(term.function)) <= given
-    known = {"return", *function_signals(term.function), *(p.name for p in function_parameters(term.function))}
-    assert known == set(term.function.__annotations__)
 
 
 @pytest.mark.parametrize("kind", list(ACTUATORS))
@@ -291,14 +271,6 @@ def test_a_term_that_is_put_in_later_is_checked_too(tmp_path: Path, monkeypatch:
     monkeypatch.setitem(TERMS, "hull.drag", Term(3))  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match=r"^hull\.drag must be a function, not 3$"):
         vessel_dynamics(vessel)
-
-
-@pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner"])
-def test_every_path_leads_to_a_number(name: str) -> None:
-    document = load_vessel(name).document
-    known = parameter_units(document)
-    assert known["inertia.m"] == "kg"
-    assert all(isinstance(value_at_path(document, path), int | float) for path in known)
 
 
 def test_numbers_of_an_actuator_have_the_unit_of_its_command() -> None:
