@@ -53,7 +53,7 @@ def main() -> None:
             if not is_utf_8(argument):
                 raise ShipidError("is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8", path=argument)
         sys.argv[1:] = _move_to_front(sys.argv[1:])
-        _with_named_commands(app, sys.argv[1:])()
+        narrow_commands(app, sys.argv[1:])()
     except BrokenPipeError:
         sys.exit(141)
     except KeyboardInterrupt:
@@ -71,7 +71,7 @@ def main() -> None:
         sys.exit(1)
 
 
-def _with_named_commands(every: typer.Typer, words: Collection[str]) -> typer.Typer:
+def narrow_commands(every: typer.Typer, words: Collection[str]) -> typer.Typer:
     """The same commands; of those that no word names only name and help: their parameters took half of the start."""
     narrow = copy(every)
     narrow.registered_commands = [
@@ -80,7 +80,7 @@ def _with_named_commands(every: typer.Typer, words: Collection[str]) -> typer.Ty
     ]
     narrow.registered_groups = [copy(one) for one in every.registered_groups]
     for one in narrow.registered_groups:
-        one.typer_instance = _with_named_commands(one.typer_instance or every, words)
+        one.typer_instance = narrow_commands(one.typer_instance or every, words)
     return narrow
 
 

@@ -77,7 +77,7 @@ def _rebuild_value(kind: Any, plain: Any, arrays: Arrays, path: str) -> Any:
     if origin is not None:  # a mapping
         return {name: _rebuild_value(inner[1], entry, arrays, f"{path}.{name}") for name, entry in plain.items()}
     if is_dataclass(kind):
-        hints = field_kinds(kind)
+        hints = field_kinds(kind)  # type: ignore[arg-type]
         parts = {f.name: _rebuild_value(hints[f.name], plain[f.name], arrays, f"{path}.{f.name}") for f in fields(kind)}
         return kind(**parts)  # type: ignore[operator]
     if issubclass(kind, BaseModel):

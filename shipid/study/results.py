@@ -69,7 +69,7 @@ class Results(NotebookView, shown=("plan.name", "folder", "missing", "table")):
         """H [m] of each model, the mean over methods and seeds, at each N_D."""
         return self.cells.pivot_table(index="model", columns="N_D", values="H")
 
-    @property
+    @cached_property
     def rows(self) -> list[dict[str, Any]]:
         """One plain dict per cell."""
         return [{str(key): value for key, value in row.items()} for row in self.cells.to_dict("records")]

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+import typer
 
 import shipid
 from shipid import cli
@@ -31,6 +32,28 @@ def test_help_version_and_vessels_are_light() -> None:
     assert shipid.__version__ in result.stdout
 
 
+def test_commands_that_no_word_names_keep_their_help() -> None:
+    """And the one that is named is whole."""
+
+    def commands(group: Any, path: str) -> dict[str, Any]:
+        inner = getattr(group, "commands", {}).items()
+        return {path: group} | {
+            key: one for name, below in inner for key, one in commands(below, f"{path} {name}").items()
+        }
+
+    whole, narrow = (
+        commands(typer.main.get_command(app), "shipid")
+        for app in (cli.app, cli.narrow_commands(cli.app, ["study", "run"]))
+    )
+    assert {path: one.help for path, one in narrow.items()} == {path: one.help for path, one in whole.items()}
+    options, known = (
+        {path: [param.name for param in one.params] for path, one in tree.items()} for tree in (narrow, whole)
+    )
+    assert options["shipid study run"] == known["shipid study run"]
+    assert known["shipid study new"]
+    assert not options["shipid study new"]
+
+
 @pytest.mark.parametrize(
     ("raised", "line"),
     [
@@ -50,7 +73,7 @@ def test_an_error_of_the_system_that_names_no_file_says_what_helps(
         raise raised
 
     monkeypatch.setattr(sys, "argv", ["shipid", "study"])
-    monkeypatch.setattr(cli, "app", command)
+    monkeypatch.setattr(cli, "narrow_commands", lambda *_: command)
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     assert re.fullmatch(line + "\n", capsys.readouterr().err)
@@ -71,11 +94,13 @@ def test_a_compiled_package_that_cannot_be_loaded_is_one_line(
         return command
 
     monkeypatch.setattr(sys, "argv", ["shipid", "study"])
-    monkeypatch.setattr(cli, "app", refused(ImportError("failed to map", path="/lib/_C.so")))
+    monkeypatch.setattr(cli, "narrow_commands", lambda *_: refused(ImportError("failed to map", path="/lib/_C.so")))
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     assert capsys.readouterr().err.startswith("error: /lib/_C.so: cannot be loaded (failed to map): ")
-    monkeypatch.setattr(cli, "app", refused(ImportError("cannot import name", path="/lib/mine.py")))
+    monkeypatch.setattr(
+        cli, "narrow_commands", lambda *_: refused(ImportError("cannot import name", path="/lib/mine.py"))
+    )
     with pytest.raises(ImportError, match="cannot import name"):
         cli.main()
 
