@@ -1,16 +1,16 @@
 """What to buy: the cheapest physics and number of runs to a goal, what more of each would buy, and when to stop.
 
 A way is one kind of physics with a number of runs. How far it errs is not known before: each way has predictive draws
-of its error, and draw i of all ways is one and the same ship. A decision has the least expected loss over the draws
-(Raiffa and Schlaifer 1961). What runs would tell before they are there is the expected least loss after them: losses
-are regressed on the errors that would be seen (Strong, Oakley and Brennan 2014, Medical Decision Making 34).
+of its error, and draw i of all ways is one and the same ship. The step to take, more runs or other physics, has the
+least expected loss over the draws (Raiffa and Schlaifer 1961), with all that may follow when its errors are seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from itertools import combinations, product
 
 import numpy as np
 import pandas as pd
@@ -29,6 +29,7 @@ from shipid.units import percent_text
 Array = NDArray[np.float64]
 DRAWS = 1000
 PROBABLE = 0.8  # chance from which on a way is said to reach a goal
+MOST_BOUGHT = 4  # physics that are thought to be bought one after the other
 AMOUNTS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 100)
 """Numbers of runs that are tried."""
 
@@ -59,93 +60,70 @@ class Ways:
         """(F, K) price of each way."""
         return np.asarray(self.prices[:, None] + self.runs)
 
-    @property
-    def good(self) -> NDArray[np.bool_]:
-        """(draws, F, K) whether a way errs by no more than the goal."""
+    def reaches(self, error: Array) -> NDArray[np.bool_]:
+        """Whether errors are no more than the goal."""
         goal = self.cost.H_end_required
-        return np.asarray(self.error <= (np.nan if goal is None else goal))
+        return np.asarray(error <= (np.nan if goal is None else goal))
 
-    @cached_property
-    def losses(self) -> Array:
-        """(draws, F, K) of each way: its price and its error in money, or, towards a goal, what is paid until it.
-
-        Towards a goal the way (f, k) runs with what is paid already up to amount k, then buys f, and goes on until the
-        goal is seen, which takes one run at least. Where all runs do not reach it, the surest physics is bought too,
-        and everything where that does not help.
-        """
-        if self.cost.per_metre is not None:
-            return np.asarray(self.price + self.cost.per_metre * self.error)
-        last = len(self.amounts)
-        good = self.good & (self.amounts > 0)
-        first = np.where(good.any(axis=2), good.argmax(axis=2), last)  # (draws, F)
-        paid = first[:, self.prices == 0].min(axis=1, initial=last)[:, None, None]
-        place = np.arange(last)
-        ends = np.minimum(np.maximum(first[:, :, None], place), np.maximum(paid, place))
-        spent = np.append(self.runs, self.runs[-1])[ends] + self.prices[:, None]
-        surest = int(np.where(self.prices > 0, (first < last).mean(axis=0), -1.0).argmax())
-        left = self.prices.sum() - self.prices
-        rest = np.where(first[:, [surest]] < last, np.minimum(self.prices[surest], left), left)[:, :, None]
-        spent = np.where(ends == last, spent + rest, spent)
-        return np.asarray(np.where(paid <= place, np.append(self.runs, 0.0)[paid], spent))
-
-    @cached_property
+    @property
     def expected(self) -> Array:
-        """(F, K) expected loss of each way."""
-        return np.asarray(self.losses.mean(axis=0))
+        """(F, K) expected loss of each way: its price and what its error costs; NaN towards a goal."""
+        metre = np.nan if self.cost.per_metre is None else self.cost.per_metre
+        return np.asarray(self.price + metre * self.error.mean(axis=0))
 
-    def look(self, place: int, seen: NDArray[np.bool_]) -> float:
-        """Expected loss of whoever runs up to a place of the amounts, sees the errors of some physics, then decides.
+    def least(self, bought: Sequence[int] = ()) -> Array:
+        """(draws, K) error in use of whoever has what is paid and some more physics: the least that is seen.
 
-        The decision is learned on one half of the draws and judged on the other: else it would look too good.
+        Without runs nothing is seen: it is that of the physics which is expected to err least.
         """
-        places = sorted({p for p in ((place + 1) // 2, place) if self.amounts[p] > 0})
-        known = np.log(self.error[:, seen][:, :, places].reshape(len(self.error), -1))
-        known = (known - known.mean(axis=0)) / np.maximum(known.std(axis=0), 1e-9)
-        squares = [known[:, [i]] * known[:, i:] for i in range(known.shape[1])]
-        basis = np.hstack([np.ones((len(known), 1)), known, *squares])
-        losses = self.losses[:, :, place:].reshape(len(known), -1)
-        values = []
-        for learned, judged in ((slice(0, None, 2), slice(1, None, 2)), (slice(1, None, 2), slice(0, None, 2))):
-            found = basis[judged] @ np.linalg.lstsq(basis[learned], losses[learned])[0]
-            values.append(np.take_along_axis(losses[judged], found.argmin(axis=1)[:, None], axis=1).mean())
-        return float(np.mean(values))
+        have = self.error[:, (self.prices == 0) | np.isin(np.arange(len(self.prices)), bought)]
+        unseen = have[:, have[:, :, 0].mean(axis=0).argmin(), :1]
+        return np.where(self.amounts > 0, have.min(axis=1), unseen)
 
     @cached_property
-    def after_runs(self) -> Array:
-        """(K - 1,) expected loss of whoever goes on to each larger amount, looks at what is paid, and then decides."""
-        return np.array([self.look(place, self.prices == 0) for place in range(1, len(self.amounts))])
+    def steps(self) -> dict[str | int, float]:
+        """Expected loss from here on of each step that can be taken now, if every later one is the best.
 
-    @cached_property
-    def after_buying(self) -> Array:
-        """(F,) expected loss of whoever buys each physics now, looks at it on the runs that are there, then decides.
+        Steps are "run", to the next amount, "stop", or the place of the physics to buy. Towards a goal whoever sees it
+        reached stops, and nobody else does as long as there is a way on.
 
-        Without runs there is nothing to look at: it is bought now only by whoever stops there.
+        States are amounts and sets of physics, the last first. In each the draws take the step of the least loss, as
+        far as what is seen there tells (`take_best_steps`).
         """
-        if self.amounts[0] == 0:
-            return np.asarray(
-                np.where((self.prices > 0) & (self.cost.per_metre is not None), self.expected[:, 0], np.inf)
-            )
-        values = np.full(len(self.prices), np.inf)
-        for f in np.flatnonzero(self.prices > 0):
-            one = np.arange(len(self.prices)) == f
-            values[f] = self.prices[f] + replace(self, prices=np.where(one, 0.0, self.prices)).look(0, one)
-        return values
+        priced, metre = np.flatnonzero(self.prices > 0).tolist(), self.cost.per_metre
+        later: dict[tuple[int, ...], Array] = {}  # physics to buy -> (draws,) loss from there on
+        sets = [one for size in range(min(len(priced), MOST_BOUGHT), -1, -1) for one in combinations(priced, size)]
+        least = {bought: self.least(bought) for bought in sets}
+        for k, bought in product(reversed(range(len(self.amounts))), sets):
+            wider = {g: tuple(sorted((*bought, g))) for g in priced if g not in bought}
+            losses: dict[str | int, Array] = {}
+            if bought in later:
+                losses["run"] = self.runs[k + 1] - self.runs[k] + later[bought]
+            if metre is not None:
+                losses["stop"] = metre * least[bought][:, k]
+            losses |= {g: self.prices[g] + later[one] for g, one in wider.items() if one in later}
+            losses = losses or {"stop": np.full(len(self.error), self.prices[[*wider]].sum())}
+            still = ~(self.reaches(least[bought][:, k]) & (self.amounts[k] > 0))
+            if not (bought or k):
+                break
+            seen = [place for place in {(k + 1) // 2, k} if self.amounts[place] > 0]
+            later[bought] = np.zeros(len(still))
+            if still.any():
+                each = np.stack([*losses.values()], axis=1)[still]
+                later[bought][still] = take_best_steps(each, np.log(least[bought][still][:, seen]))
+        return {step: float((loss * still).mean()) for step, loss in losses.items()}
 
-    def next_step(self) -> tuple[int | None, int | None]:
-        """The amount of runs to go on to at least, or the place of the physics to buy now; neither: it is time to stop.
-
-        Each step is worth what it costs and what it tells. Towards a goal nobody stops as long as there is a way on.
-        """
-        stop = self.expected[self.prices == 0, 0].min() if self.cost.per_metre is not None else np.inf
-        run, buy = self.after_runs.min(initial=np.inf), self.after_buying.min()
-        if stop <= min(run, buy):
-            return None, None
-        return (int(self.amounts[1]), None) if run <= buy else (None, int(self.after_buying.argmin()))
+    @property
+    def next_step(self) -> str | int:
+        """The step of `steps` with the least expected loss."""
+        return min(self.steps, key=lambda step: self.steps[step])
 
     @property
     def reach(self) -> Array:
         """(F, K) chance that a way errs by no more than the goal; NaN without a goal."""
-        return np.asarray(self.good.mean(axis=0) if self.cost.per_metre is None else np.full(self.price.shape, np.nan))
+        return np.asarray(
+            self.reaches(self.error).mean(axis=0) if self.cost.per_metre is None else np.full(self.price.shape, np.nan)
+        )
 
     def best(self, place: int | None = None) -> tuple[int, int]:
         """Places (f, k) of the best way, or of the best one with one physics.
@@ -177,7 +155,7 @@ class Ways:
         return frame.assign(frontier=frame["H_end"] < cheaper, unit=self.cost.unit, goal=goal)
 
     def sentences(self) -> list[str]:
-        """What to buy, what the next runs and other physics would change, and when to stop."""
+        """What to buy, what further runs and other physics would change, what to do next, and when to stop."""
         cost, (f, k) = self.cost, self.best()
         money = partial(price_text, unit=cost.unit)
         goal, way = cost.H_end_required, self.way_text(f, k)
@@ -185,21 +163,31 @@ class Ways:
         lines = [f"{aim}, of those tried, is {way}."]
         if goal is not None and not self.reach[f, k] >= PROBABLE:
             lines = [f"No way that was tried is likely to reach {metres_text(goal)}; the surest is {way}."]
-        if k + 1 < len(self.amounts):
-            count, change = int(self.amounts[k + 1] - self.amounts[k]), self.expected[f, k + 1] - self.expected[f, k]
-            more = f"{counted_text(count, 'further run')} would cost {money(self.runs[k + 1] - self.runs[k])}"
-            gain = f"a chance of {percent_text(self.reach[f, k + 1])}" if goal else f"{money(change)} more in all"
-            lines.append(f"{more}, for an error of {metres_text(np.median(self.error[:, f, k + 1]))}: {gain}.")
         others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
-        lines += [f"Not as good, with other physics: {'; '.join(others)}."] if others else []
-        amount, bought = self.next_step()
-        step = "stop here" if bought is None else f"buy {model_text(self.foundations[bought])}"
-        step = step if amount is None else f"go on to {counted_text(amount, 'run')} and look again"
-        if goal is None:
-            least = metres_text(cost.run / (cost.per_metre or 1))
-            return [*lines, f"Next: {step}. Stop when a further run lowers the error by less than {least}, its price."]
-        total = money(min(self.after_runs.min(initial=np.inf), self.after_buying.min()))
-        return [*lines, f"To see the goal reached on runs: {step}, and stop as soon as it is. Expect to pay {total}."]
+        lines += [f"The best with other physics: {'; '.join(others)}."] if others else []
+        if goal is not None and self.price[f, k] == 0:
+            return [*lines, "Stop here: nothing has to be bought."]
+        step, *rest = sorted(self.steps, key=lambda one: self.steps[one])
+        whole = "in all" if goal else "with what the error costs"
+        text = (
+            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} {whole}"
+        )
+        text += "".join(f"; {money(self.steps[one])} if you {self.step_text(one)}" for one in rest)
+        least = metres_text(cost.run / (cost.per_metre or 1))
+        end = f"Stop when a further run lowers the error by less than {least}: a run costs as much."
+        return [*lines, f"{text}.", end if goal is None else f"Stop as soon as runs show {metres_text(goal)} or less."]
+
+    def step_text(self, step: str | int) -> str:
+        """What to do, what it costs, and the error that is expected then, in words."""
+        if step == "stop":
+            return f"stop (error {metres_text(np.median(self.least()[:, 0]))})"
+        if step == "run":
+            price, error = self.runs[1], self.least()[:, 1]
+            text = f"go on from {int(self.amounts[0])} to {counted_text(int(self.amounts[1]), 'run')}"
+        else:
+            price, error = self.prices[step], self.error[:, step, 0]
+            text = f"buy {model_text(self.foundations[step])}"
+        return f"{text} ({price_text(price, self.cost.unit)}, error {metres_text(np.median(error))})"
 
     def way_text(self, f: int, k: int) -> str:
         """A way, its price, its error, and its chance or its loss, in words."""
@@ -210,6 +198,19 @@ class Ways:
         if self.cost.per_metre is None:
             return f"{text}, a chance of {percent_text(self.reach[f, k])}"
         return f"{text}, {price_text(self.expected[f, k], self.cost.unit)} with what the error costs"
+
+
+def take_best_steps(losses: Array, seen: Array) -> Array:
+    """(draws,) loss of each draw by the step of the least loss (draws, steps), as far as what is seen tells.
+
+    seen : (draws, S). Losses are regressed on it and its squares (Longstaff and Schwartz 2001, Review of Financial
+    Studies 14), with ten draws or more for each number that is learned.
+    """
+    x = (seen - seen.mean(axis=0)) / np.maximum(seen.std(axis=0), 1e-9)
+    basis = np.hstack([np.ones((len(x), 1)), x, *(x[:, [i]] * x[:, i:] for i in range(x.shape[1]))])
+    basis = basis[:, : max(len(x) // 10, 1)]
+    found = basis @ np.linalg.lstsq(basis, losses)[0]
+    return np.asarray(np.take_along_axis(losses, found.argmin(axis=1)[:, None], axis=1)[:, 0])
 
 
 def errors_in_use(error: Array) -> Array:
@@ -267,6 +268,13 @@ def cost_frame(results: Results) -> pd.DataFrame:
 def cost_sentences(results: Results) -> list[str]:
     """What a study says on what to buy; nothing where it has no `[cost]`."""
     try:
-        return [] if results.plan.study.cost is None else study_ways(results).sentences()
+        study = results.plan.study
+        if study.cost is None:
+            return []
+        there = f"Its {counted_text(results.pool, 'run')} of training are paid: they count."
+        if study.data is None:
+            most = counted_text(int(results.judged_cells["N_D"].max()), "run")
+            there = f"This study simulated up to {most}; at sea none is there yet, so runs count from 0."
+        return [*study_ways(results).sentences(), there]
     except ShipidError as error:
         return [f"What to buy cannot be said: {error.message}."]
