@@ -181,7 +181,7 @@ class Ways:
         """What to do, what it costs, and the error that is expected then, in words."""
         if step == "stop":
             return f"stop (error {metres_text(np.median(self.least()[:, 0]))})"
-        if step == "run":
+        if isinstance(step, str):
             price, error = self.runs[1], self.least()[:, 1]
             text = f"go on from {int(self.amounts[0])} to {counted_text(int(self.amounts[1]), 'run')}"
         else:
