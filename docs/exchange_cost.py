@@ -209,7 +209,7 @@ def advise_by(knowledge: Knowledge) -> Policy:
             draws[:, :, state.place :],
             prices,
         )
-        best = ways.next_step
+        best = next(iter(ways.steps))
         return (-1, best) if isinstance(best, int) else (state.place + 1, -1) if best == "run" else STOP
 
     return step

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from itertools import combinations, product
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -60,10 +61,10 @@ class Ways:
         """(F, K) price of each way."""
         return np.asarray(self.prices[:, None] + self.runs)
 
-    def reaches(self, error: Array) -> NDArray[np.bool_]:
-        """Whether errors are no more than the goal."""
-        goal = self.cost.H_end_required
-        return np.asarray(error <= (np.nan if goal is None else goal))
+    @property
+    def goal(self) -> float:
+        """Error that is to be reached [m]; NaN where a metre has a price."""
+        return np.nan if self.cost.H_end_required is None else self.cost.H_end_required
 
     @property
     def expected(self) -> Array:
@@ -82,7 +83,7 @@ class Ways:
 
     @cached_property
     def steps(self) -> dict[str | int, float]:
-        """Expected loss from here on of each step that can be taken now, if every later one is the best.
+        """Expected loss from here on of each step that can be taken now, if every later one is the best; least first.
 
         Steps are "run", to the next amount, "stop", or the place of the physics to buy. Towards a goal whoever sees it
         reached stops, and nobody else does as long as there is a way on.
@@ -103,7 +104,7 @@ class Ways:
                 losses["stop"] = metre * least[bought][:, k]
             losses |= {g: self.prices[g] + later[one] for g, one in wider.items() if one in later}
             losses = losses or {"stop": np.full(len(self.error), self.prices[[*wider]].sum())}
-            still = ~(self.reaches(least[bought][:, k]) & (self.amounts[k] > 0))
+            still = ~((least[bought][:, k] <= self.goal) & (self.amounts[k] > 0))
             if not (bought or k):
                 break
             seen = [place for place in {(k + 1) // 2, k} if self.amounts[place] > 0]
@@ -111,19 +112,13 @@ class Ways:
             if still.any():
                 each = np.stack([*losses.values()], axis=1)[still]
                 later[bought][still] = take_best_steps(each, np.log(least[bought][still][:, seen]))
-        return {step: float((loss * still).mean()) for step, loss in losses.items()}
-
-    @property
-    def next_step(self) -> str | int:
-        """The step of `steps` with the least expected loss."""
-        return min(self.steps, key=lambda step: self.steps[step])
+        expected = {step: float((loss * still).mean()) for step, loss in losses.items()}
+        return dict(sorted(expected.items(), key=itemgetter(1)))
 
     @property
     def reach(self) -> Array:
         """(F, K) chance that a way errs by no more than the goal; NaN without a goal."""
-        return np.asarray(
-            self.reaches(self.error).mean(axis=0) if self.cost.per_metre is None else np.full(self.price.shape, np.nan)
-        )
+        return np.asarray((self.error <= self.goal).mean(axis=0) + 0 * self.goal)
 
     def best(self, place: int | None = None) -> tuple[int, int]:
         """Places (f, k) of the best way, or of the best one with one physics.
@@ -151,8 +146,7 @@ class Ways:
         columns |= {"probability": self.reach, "expected": self.expected, "chosen": chosen}
         frame = pd.DataFrame({name: values.ravel() for name, values in columns.items()})
         cheaper = frame.sort_values(["price", "H_end"])["H_end"].cummin().shift(fill_value=np.inf).sort_index()
-        goal = np.nan if self.cost.H_end_required is None else self.cost.H_end_required
-        return frame.assign(frontier=frame["H_end"] < cheaper, unit=self.cost.unit, goal=goal)
+        return frame.assign(frontier=frame["H_end"] < cheaper, unit=self.cost.unit, goal=self.goal)
 
     def sentences(self) -> list[str]:
         """What to buy, what further runs and other physics would change, what to do next, and when to stop."""
@@ -161,27 +155,33 @@ class Ways:
         goal, way = cost.H_end_required, self.way_text(f, k)
         aim = "The cheapest way in all" if goal is None else f"The cheapest way to {metres_text(goal)} at the horizon"
         lines = [f"{aim}, of those tried, is {way}."]
-        if goal is not None and not self.reach[f, k] >= PROBABLE:
-            lines = [f"No way that was tried is likely to reach {metres_text(goal)}; the surest is {way}."]
         others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
-        lines += [f"The best with other physics: {'; '.join(others)}."] if others else []
-        if goal is not None and self.price[f, k] == 0:
-            return [*lines, "Stop here: nothing has to be bought."]
-        step, *rest = sorted(self.steps, key=lambda one: self.steps[one])
+        others = [f"The best with other physics: {'; '.join(others)}."] if others else []
+        if self.reach[f, k] < PROBABLE:
+            lines = [f"No way that was tried is likely to reach {metres_text(self.goal)}; the surest is {way}."]
+        elif goal is not None and self.price[f, k] == 0:
+            return [*lines, *others, "Stop here: nothing has to be bought."]
+        step, *rest = self.steps
         whole = "in all" if goal else "with what the error costs"
         text = (
             f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} {whole}"
         )
-        text += "".join(f"; {money(self.steps[one])} if you {self.step_text(one)}" for one in rest)
+        instead = [f"{money(self.steps[one])} if you {self.step_text(one)}" for one in rest]
+        text += f"; instead, {', '.join(instead)}" if instead else ""
         least = metres_text(cost.run / (cost.per_metre or 1))
         end = f"Stop when a further run lowers the error by less than {least}: a run costs as much."
-        return [*lines, f"{text}.", end if goal is None else f"Stop as soon as runs show {metres_text(goal)} or less."]
+        return [
+            *lines,
+            *others,
+            f"{text}.",
+            end if goal is None else f"Stop as soon as runs show {metres_text(goal)} or less.",
+        ]
 
     def step_text(self, step: str | int) -> str:
         """What to do, what it costs, and the error that is expected then, in words."""
         if step == "stop":
             return f"stop (error {metres_text(np.median(self.least()[:, 0]))})"
-        if step == "run":
+        if isinstance(step, str):
             price, error = self.runs[1], self.least()[:, 1]
             text = f"go on from {int(self.amounts[0])} to {counted_text(int(self.amounts[1]), 'run')}"
         else:

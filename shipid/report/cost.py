@@ -89,15 +89,10 @@ def ways_table(content: ReportContent) -> PageTable:
     best = ways[ways["chosen"]].sort_values("price").assign(foundation=lambda one: one["foundation"].map(model_text))
     columns = {name: column for name, column in WAY_COLUMNS.items() if best[column].notna().any()}
     unit = ways["unit"].iloc[0]
+    more = '"chance" is that of the goal.'
     if best["goal"].isna().all():
-        takeaway = f'Prices are in {unit}; "price and error" adds what the expected error costs.'
-    else:
-        columns = {"expect to pay" if name == "price and error" else name: one for name, one in columns.items()}
-        takeaway = (
-            f'Prices are in {unit}; "chance" is that of the goal, "expect to pay" what is paid on average until runs '
-            "show that the goal is reached, with more runs or other physics where this way does not."
-        )
-    return frame_table("ways", "The best way with each physics", takeaway, best, columns)
+        more = '"price and error" adds what the expected error costs.'
+    return frame_table("ways", "The best way with each physics", f"Prices are in {unit}; {more}", best, columns)
 
 
 WHAT_TO_BUY = Section("What to buy", {"frontier": (frontier_figure, "cost"), "ways": (ways_table, "cost")})
