@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.faults import clusters, documents, folders
+from tests.faults import clusters, documents, folders, foundations, recordings
 from tests.faults.trials import HANG, Outcome, outcomes
 
 
@@ -31,6 +31,12 @@ ROWS: dict[str, Row] = {
     "mapping": Row(documents.mapping, 400, "mutated text"),
     "chain": Row(documents.chain, 40, "patches on patches"),
     "log": Row(documents.log, 1000, "mutated text"),
+    **{f"{one} log": Row(recordings.recording(one), 500, "damaged, sizes forged", 60.0) for one in recordings.SOUND},
+    "exchanged log": Row(recordings.exchanged, 100, "a link led elsewhere while it is read"),
+    "fmu": Row(foundations.fmu, 500, "code, description, archive, table", 60.0),
+    "function": Row(foundations.function, 500, "results, errors, arguments changed"),
+    "predictions": Row(foundations.predictions, 500, "rows and columns changed"),
+    "package": Row(foundations.package, 300, "entry points and members", 60.0),
     "predictor": Row(folders.predictor, 300, "arrays and header changed"),
     "dataset": Row(folders.dataset, 300, "columns and metadata changed"),
     "damaged": Row(folders.damaged, 1000, "files of a folder changed", 60.0),

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from shipid.logs.readers import read_log_table
+from tests.faults import recordings
 from tests.faults.campaign import ROWS
 from tests.faults.mutations import MUTATIONS, documents, mutated
 from tests.faults.trials import Failure, outcome, outcomes, table
+from tests.logs.conftest import T
 
 QUICK = {
     "study": 12,
@@ -16,6 +21,12 @@ QUICK = {
     "predictor": 15,
     "dataset": 8,
     "memory": 6,
+    "mcap log": 4,
+    "ulg log": 4,
+    "exchanged log": 4,
+    "function": 6,
+    "predictions": 6,
+    "package": 3,
     "damaged": 4,
     "killed": 3,
 }
@@ -34,6 +45,12 @@ def test_a_few_faults(name: str) -> None:
 def test_a_few_slow_faults(name: str) -> None:
     drawn = [outcome(ROWS[name].trial, seed) for seed in range(2)]
     assert not [one for one in drawn if one.failed], table({name: drawn})
+
+
+@pytest.mark.parametrize("ending", recordings.SOUND)
+def test_a_recording_that_is_not_damaged_is_read(ending: str, tmp_path: Path) -> None:
+    write, form = recordings.SOUND[ending]
+    assert len(read_log_table(write(tmp_path), form, "time")) >= len(T)
 
 
 def test_mutations_are_drawn_by_seed() -> None:

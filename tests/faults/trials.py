@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from shipid.errors import ShipidError
+from shipid.cli import error_line
 
 HANG = 20.0  # s of processor or wall time that no trial may take
 MEMORY = 12 << 30  # bytes of address space of a trial
@@ -78,16 +78,14 @@ def outcome(work: Callable[[int], Any], seed: int) -> Outcome:
     """Outcome of one trial in this process."""
     try:
         work(seed)
-    except ShipidError as error:
-        line = str(error)
-        good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
-        return Outcome(seed, "refused" if good else "no line", line)
     except Failure as error:
         return Outcome(seed, str(error.args[0]), " ".join(map(str, error.args[1:])))
-    except OSError as error:
-        if error.filename is not None or error.strerror:  # the command line writes these in one line
-            return Outcome(seed, "refused", f"{error.filename}: {error.strerror}")
-        return Outcome(seed, "traceback", _short(error))
+    except Exception as error:
+        line = error_line(error)
+        if line is None:
+            return Outcome(seed, "traceback", _short(error))
+        good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
+        return Outcome(seed, "refused" if good else "no line", line)
     except BaseException as error:
         return Outcome(seed, "traceback", _short(error))
     return Outcome(seed, "sound")
