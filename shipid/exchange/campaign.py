@@ -18,7 +18,7 @@ import pandas as pd
 
 from shipid.errors import DivergenceError, ResultError, ShipidError
 from shipid.exchange.ships import Dice, DrawnShip, draw_ship
-from shipid.files import make_folder, read_json, replace_whole, write_json
+from shipid.files import read_json, write_json, write_table
 from shipid.metrics import position_error
 from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
 from shipid.study.declared import NO_MODEL
@@ -310,24 +310,32 @@ def run_ships(
     Raises ResultError for a folder of another study.
     """
     first, every = check_shard(shard)
-    make_folder(folder)
     settings = {"seed": seed, "drawn": drawn, "amounts": list(amounts)}
     place = folder / "ships.json"
     if place.exists() and (known := read_json(place)) != settings:
         raise ResultError(f"holds the study over ships with {known}, not {settings}: take another folder", file=place)
     write_json(place, settings)
     names = ship_names(drawn)[first - 1 :: every]
-    left = [name for name in names if not (folder / f"{name}.parquet").exists()]
+    left = [name for name in names if not (folder / f"{name}.parquet").is_file()]
+    if len(left) < len(names):  # a kill may have left the table behind its ships
+        _write_cells(folder, drawn)
     for name, cells in on_workers(partial(_try_ship, seed, drawn, amounts), left, workers):
         if isinstance(cells, str):
             yield f"{name} is left out: {cells}"
-            continue
-        with replace_whole(folder / f"{name}.parquet") as file:
-            cells.to_parquet(file)
-        files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").exists()]
+        else:
+            write_table(folder / f"{name}.parquet", cells)
+            yield f"{name}: {len(cells)} cells; {_write_cells(folder, drawn)} of {len(BUNDLED) + drawn} ships"
+
+
+def _write_cells(folder: Path, drawn: int) -> int:
+    """Join the tables of the ships that are finished; their number. ResultError where one is damaged."""
+    files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").is_file()]
+    try:
         table = pd.concat(map(pd.read_parquet, files), ignore_index=True)
-        with replace_whole(folder / "cells.parquet") as file:
-            table.to_parquet(file)
-        with replace_whole(folder / "cells.csv") as file:
-            table.to_csv(file, index=False)
-        yield f"{name}: {len(cells)} cells; {len(files)} of {len(BUNDLED) + drawn} ships"
+    except (OSError, ValueError) as error:
+        raise ResultError(
+            f"the table of a ship is damaged ({' '.join(str(error).split())}): delete it, and start again", file=folder
+        ) from None
+    for name in ("cells.parquet", "cells.csv"):
+        write_table(folder / name, table)
+    return len(files)

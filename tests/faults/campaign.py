@@ -44,6 +44,12 @@ ROWS: dict[str, Row] = {
     "full": Row(folders.full, 200, "limit of file size, and intercepted calls", 200.0),
     "together": Row(folders.together, 60, "processes", 300.0),
     "two plans": Row(folders.two_plans, 60, "processes", 300.0),
+    "starts": Row(folders.many_starts, 20, "twenty processes at once", 300.0),
+    "shards": Row(folders.shards, 500, "SIGKILL, and files changed", 300.0),
+    "user": Row(folders.another_user, 200, "files of another user, or read only", 200.0),
+    "clock": Row(folders.clocks, 200, "the time jumps, files are of the future", 200.0),
+    "version": Row(folders.another_version, 500, "keys of another version, sealed", 60.0),
+    "ships": Row(folders.ships, 500, "SIGKILL, and files changed", 60.0),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }

@@ -27,6 +27,7 @@ QUICK = {
     "function": 6,
     "predictions": 6,
     "package": 3,
+    "ships": 6,
     "damaged": 4,
     "killed": 3,
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import resource
 import time
 import traceback
@@ -15,6 +16,7 @@ from typing import Any
 from shipid.cli import error_line
 
 HANG = 20.0  # s of processor or wall time that no trial may take
+PATIENCE = float(os.environ.get("FAULTS_PATIENCE", "1"))  # times the limits, on a machine that others use
 MEMORY = 12 << 30  # bytes of address space of a trial
 
 
@@ -43,6 +45,7 @@ class Failure(Exception):
 def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HANG) -> Iterator[Outcome]:
     """Outcome of each trial; `work` is called with its seed in a forked process, which a hanging trial ends."""
     context: Any = multiprocessing.get_context("fork")
+    limit *= PATIENCE
     left = list(seeds)
     while left:
         here, there = context.Pipe()
