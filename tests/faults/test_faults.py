@@ -28,6 +28,7 @@ QUICK = {
     "predictions": 6,
     "package": 3,
     "ships": 6,
+    "options": 10,
     "damaged": 4,
     "killed": 3,
 }

@@ -71,7 +71,7 @@ def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HA
 
 
 def _serve(pipe: Connection, work: Callable[[int], Any], seeds: Sequence[int]) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
     for seed in seeds:
         pipe.send(outcome(work, seed))
     pipe.close()
