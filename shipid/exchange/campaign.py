@@ -103,10 +103,8 @@ def _known_particulars(vessel: Vessel) -> Particulars | None:
     signals = {name.rpartition(".")[2] for name in controls.commands}
     propulsor = "azimuth" if "alpha" in signals else "propeller-rudder" if "delta" in signals else "differential"
     n = balanced_shaft(controls, U)
-    rpm = None if n is None else 60 * n
-    return Particulars(
-        *(known[name] for name in ("L_pp", "B", "T", "C_b")), U, propulsor, rpm=rpm, shafts=len(controls.drives)
-    )
+    L, B, T, block = (known[name] for name in ("L_pp", "B", "T", "C_b"))
+    return Particulars(L, B, T, block, U, propulsor, rpm=None if n is None else 60 * n, shafts=len(controls.drives))
 
 
 def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:

@@ -140,7 +140,7 @@ def _repacked(content: bytes, rng: random.Random) -> bytes:
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         for one, data in parts.items():
-            archive.writestr(one, data)
+            archive.writestr(one, data, zipfile.ZIP_STORED if one == "mimetype" else None)
     packed = bytearray(out.getvalue())
     if forged:  # file size and size in the archive: PK 03 04 at +22 and +18, PK 01 02 at +24 and +20
         size = struct.pack("<I", rng.choice([0, 1, 1000, 2**31 - 1, 2**32 - 2]))
