@@ -53,7 +53,7 @@ ROWS: dict[str, Row] = {
     "exported": Row(documents.sanitized, 60, "gcc -fsanitize=address,undefined", 120.0),
     "options": Row(documents.options, 500, "of expect and vessel similar"),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
-    "worker": Row(clusters.worker_lost, 12, "one of two killed, stopped, stopped for a while", 180.0),
+    "worker": Row(clusters.worker_lost, 12, "one of two killed, stopped, stopped for a while", 300.0),
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }
 EVERY = 30.0  # s between lines of progress

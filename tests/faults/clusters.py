@@ -62,7 +62,7 @@ def worker_lost(seed: int) -> None:
     """One of two workers is killed, stopped, or stopped for a while: the other does its work, to the same digits."""
     rng = random.Random(f"worker {seed}")
     reference()
-    with a_place() as place, patch.dict(os.environ, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="8s"):
+    with a_place() as place, patch.dict(os.environ, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="45s"):
         with a_cluster(place, 2) as (address, processes):
             plan, victim = tiny_plan(place), rng.choice(processes[1:])
             how, after = ["killed", "stopped", "paused"][seed % 3], rng.choice(["start", "cell"])
