@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from shipid.logs.readers import read_log_table
+from shipid.study.plan import read_plan
 from tests.faults import recordings
 from tests.faults.campaign import ROWS
 from tests.faults.mutations import MUTATIONS, documents, mutated
@@ -53,6 +54,11 @@ def test_a_few_slow_faults(name: str) -> None:
 def test_a_recording_that_is_not_damaged_is_read(ending: str, tmp_path: Path) -> None:
     write, form = recordings.SOUND[ending]
     assert len(read_log_table(write(tmp_path), form, "time")) >= len(T)
+
+
+def test_the_study_with_every_block_is_sound() -> None:
+    """It was not for a while, and no mutation of it was ever run."""
+    assert read_plan(documents("study")["rich"]).study.cost is not None
 
 
 def test_mutations_are_drawn_by_seed() -> None:
