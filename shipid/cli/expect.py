@@ -30,7 +30,7 @@ def expect_command(
     ] = None,
     runs: Annotated[list[int] | None, typer.Option(min=0, help="that train; may be repeated")] = None,
     ahead: Annotated[
-        float | None, typer.Option(min=0.01, help="ship lengths at 0.75 of the service speed; default: 2")
+        float | None, typer.Option(min=0.01, max=1e6, help="ship lengths at 0.75 of the service speed; default: 2")
     ] = None,
     sea: Annotated[
         Literal["calm", "ordinary", "rough"] | None, typer.Option(help="of a third of the ships; default: of all")

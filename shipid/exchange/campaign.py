@@ -20,7 +20,7 @@ import pandas as pd
 
 from shipid.errors import DivergenceError, ResultError, ShipidError
 from shipid.exchange.ships import Dice, DrawnShip, draw_ship
-from shipid.files import make_folder, read_json, write_json, write_table
+from shipid.files import read_json, write_json, write_table
 from shipid.metrics import position_error
 from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
 from shipid.study.declared import NO_MODEL
@@ -107,9 +107,8 @@ def _known_particulars(vessel: Vessel) -> Particulars | None:
     signals = {name.rpartition(".")[2] for name in controls.commands}
     propulsor = "azimuth" if "alpha" in signals else "propeller-rudder" if "delta" in signals else "differential"
     n = balanced_shaft(controls, U)
-    rpm = None if n is None else 60 * n
     L, B, T, block = (known[name] for name in ("L_pp", "B", "T", "C_b"))
-    return Particulars(L, B, T, block, U, propulsor, rpm=rpm, shafts=len(controls.drives))
+    return Particulars(L, B, T, block, U, propulsor, rpm=None if n is None else 60 * n, shafts=len(controls.drives))
 
 
 def _sister_of(ship: StudiedShip, seed: int, drawn: int) -> Vessel | None:
@@ -323,19 +322,34 @@ def run_ships(
     Raises ResultError for a folder of another study.
     """
     first, every = check_shard(shard)
-    make_folder(folder)
     settings = {"seed": seed, "drawn": drawn, "amounts": list(amounts)}
     place = folder / "ships.json"
     if place.exists() and (known := read_json(place)) != settings:
         raise ResultError(f"holds the study over ships with {known}, not {settings}: take another folder", file=place)
     write_json(place, settings)
-    left = [one for one in ship_names(drawn)[first - 1 :: every] if not (folder / f"{one}.parquet").exists()]
+    names = ship_names(drawn)[first - 1 :: every]
+    left = [name for name in names if not (folder / f"{name}.parquet").is_file()]
+    if len(left) < len(names):  # a kill may have left the table behind its ships
+        _write_cells(folder, drawn)
     for name, cells in on_workers(partial(_try_ship, folder, seed, drawn, amounts), left, workers):
         if isinstance(cells, str):
             yield f"{name} is left out: {cells}"
-            continue
-        write_table(folder / f"{name}.parquet", cells)
-        (folder / f"{name}.json").unlink(missing_ok=True)
-        files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").exists()]
-        write_table(folder / "cells.csv", pd.concat(map(pd.read_parquet, files), ignore_index=True))
-        yield f"{name}: {len(cells)} cells; {len(files)} of {len(BUNDLED) + drawn} ships"
+        else:
+            write_table(folder / f"{name}.parquet", cells)
+            (folder / f"{name}.json").unlink(missing_ok=True)
+            yield f"{name}: {len(cells)} cells; {_write_cells(folder, drawn)} of {len(BUNDLED) + drawn} ships"
+
+
+def _write_cells(folder: Path, drawn: int) -> int:
+    """Join the tables of the ships that are finished; their number. ResultError where one is damaged."""
+    files = [file for one in ship_names(drawn) if (file := folder / f"{one}.parquet").is_file()]
+    try:
+        tables = {file.stem: pd.read_parquet(file) for file in files}
+        if any({*one["ship"]} != {name} for name, one in tables.items()):
+            raise ValueError("it is of another ship than its name says")
+    except (OSError, ValueError, KeyError) as error:
+        raise ResultError(
+            f"the table of a ship is damaged ({' '.join(str(error).split())}): delete it, and start again", file=folder
+        ) from None
+    write_table(folder / "cells.csv", pd.concat(tables.values(), ignore_index=True))
+    return len(files)

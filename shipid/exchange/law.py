@@ -152,7 +152,7 @@ class Hierarchy:
         """ln(value / unit) less `mean` (draws, rows) of known cells, if their floors are so many times as large."""
         many = known.iloc[np.tile(np.arange(len(known)), len(floors))]
         many = many.assign(floor=many["floor"] * np.repeat(floors, len(known)))
-        return (response_values(self.response, many) - self.mean(many)[0]).reshape(len(floors), -1)
+        return np.asarray(response_values(self.response, many) - self.mean(many)[0]).reshape(len(floors), -1)
 
     def likelihood(self, own: pd.DataFrame, floors: Array) -> Array:
         """Student log density (draws,), but for a constant, of known cells of a ship at each of these factors."""

@@ -112,16 +112,20 @@ def read_prediction_frame(file: Path) -> pd.DataFrame:
         if name not in frame:
             raise DataError(f"lacks this column; it has {', '.join(map(str, frame))}", file=file, path=name)
     for name in [*KEYS[1:], *(name for name in MEASURED_MOTION if name in frame)]:
-        given, frame[name] = frame[name], pd.to_numeric(frame[name], errors="coerce").astype(float)
+        texts = frame[name].astype(str) if frame[name].dtype == object else frame[name]  # of lists, for example
+        given, frame[name] = frame[name], pd.to_numeric(texts, errors="coerce").astype(float)
         if (bad := np.flatnonzero(~np.isfinite(frame[name]))).size:
-            fault = f"{given.iloc[bad[0]]} in row {bad[0]} is no number; {len(bad)} of {len(frame)} rows have none"
-            raise DataError(fault, file=file, path=name)
+            raise DataError(
+                f"{given.iloc[bad[0]]} in row {bad[0]} is no number; {len(bad)} of {len(frame)} rows have none",
+                file=file,
+                path=name,
+            )
     return frame
 
 
 def index_predictions(frame: pd.DataFrame) -> pd.DataFrame:
     """Rows by run, instant and ahead, times to 0.1 ms."""
-    return frame.round(dict.fromkeys(KEYS[1:], 4)).set_index(KEYS)
+    return frame.round(dict.fromkeys(KEYS[1:], 4)).astype({KEYS[0]: str}).set_index(KEYS)
 
 
 def prediction_keys(run: Array, instant: Array, ahead: Array) -> pd.MultiIndex:

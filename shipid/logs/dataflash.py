@@ -25,8 +25,11 @@ def read_dataflash(file: Path, is_needed: Callable[[str], bool]) -> Topics:
 
         log = DFReader.DFReader_binary(str(file), zero_time_base=True)
         try:
-            names = {one.name: [*one.columns] for one in log.formats.values() if "TimeUS" in one.columns}
-            names = {name: names[name] for name in names.keys() - OF_FORMAT}
+            names = {
+                one.name: [*one.columns]
+                for one in log.formats.values()
+                if "TimeUS" in one.columns and one.name not in OF_FORMAT
+            }
             while (message := log.recv_match(type=[*names])) if names else None:
                 kind, place = message.get_type(), message.fmt.instance_field
                 topic = kind if place is None else f"{kind}[{getattr(message, place)}]"
@@ -36,7 +39,7 @@ def read_dataflash(file: Path, is_needed: Callable[[str], bool]) -> Topics:
                     rows[topic].append({"time": 1e-6 * message.TimeUS} | numbers)
         finally:
             log.close()
-    return {topic: pd.DataFrame(said) for topic, said in rows.items() if len(said[0]) > 1}
+        return {topic: pd.DataFrame(said) for topic, said in rows.items() if len(said[0]) > 1}
 
 
 def is_dataflash(_: Path, head: bytes) -> dict[str, Any] | None:

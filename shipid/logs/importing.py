@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import as_path, check_class
+from shipid.arguments import as_path, check_choice, check_class
 from shipid.data.dataset import (
     BREAK,
     STANDARD_DEVIATIONS,
@@ -115,8 +115,7 @@ def import_log(
     check_class("mapping", mapping, Mapping, "as of `read_mapping`", DataError)
     source, off = as_path("file", file, DataError), tuple(without)
     for kind in off:
-        if kind not in REPAIRS:
-            raise DataError(f"no repair of this kind: {suggest_name(kind, REPAIRS)}", path=kind)
+        check_choice("repair", kind, REPAIRS, DataError)
     digest = log_digest(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(
@@ -133,6 +132,8 @@ def import_log(
             mapping = mapping.model_copy(
                 update={"origin": PlaneOrigin.model_construct(latitude=first[0], longitude=first[1])}
             )
+    if digest != log_digest(mapping, source):  # at its end, or by a link that leads elsewhere
+        raise DataError("has changed while it was read: import it again when nothing writes to it", file=source)
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows, repairs = parts[0].rows, _add_records([part.records for part in parts])
     metadata = {

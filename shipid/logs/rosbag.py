@@ -35,7 +35,7 @@ def read_bag(file: Path, is_needed: Callable[[str], bool]) -> Topics:
             for connection, received, content in bag.messages(needed) if needed else ():
                 message = bag.deserialize(content, connection.msgtype)
                 rows[connection.topic].append({"time": 1e-9 * received} | dict(_numbers_in(message)))
-    return {topic: _with_stamps(pd.DataFrame(said)) for topic, said in rows.items() if len(said[0]) > 1}
+        return {topic: _with_stamps(pd.DataFrame(said)) for topic, said in rows.items() if len(said[0]) > 1}
 
 
 def _with_stamps(said: pd.DataFrame) -> pd.DataFrame:

@@ -24,15 +24,15 @@ def read_ulog(file: Path, is_needed: Callable[[str], bool]) -> Topics:
             names = [name for name in heads.message_formats if is_needed(name)]
         with file.open("rb") as stream:
             parts = ULog(stream, names).data_list if names else []
-    topics = {f"{one.name}[{one.multi_id}]" if one.multi_id else one.name: one.data for one in parts}
-    return {
-        name: pd.DataFrame(
-            {"time": 1e-6 * said["timestamp"]}
-            | {key: values for key, values in said.items() if key != "timestamp" and not key.startswith("_padding")}
-        )
-        for name, said in topics.items()
-        if is_needed(name) and len(said["timestamp"])
-    }
+        topics = {f"{one.name}[{one.multi_id}]" if one.multi_id else one.name: one.data for one in parts}
+        return {
+            name: pd.DataFrame(
+                {"time": 1e-6 * said["timestamp"]}
+                | {key: values for key, values in said.items() if key != "timestamp" and not key.startswith("_padding")}
+            )
+            for name, said in topics.items()
+            if is_needed(name) and len(said["timestamp"])
+        }
 
 
 def is_ulog(_: Path, head: bytes) -> dict[str, Any] | None:

@@ -208,12 +208,13 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
 
 def _read_models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
     """One row per model: accuracy [m], also by axis of the frame (11), and on how many windows it diverges, if any."""
-    frame = pd.DataFrame(read_json(folder / store.FOUNDATIONS))
-    counts = frame.filter(like="diverged_")
-    frame = frame if counts.sum().any() else frame.drop(columns=counts)
-    frame["model"] = frame["foundation"]
-    for name in ("A", "A_90", "A_rms"):
-        frame[name] = frame[name].astype(float)
+    try:
+        frame = pd.DataFrame(read_json(folder / store.FOUNDATIONS)).astype(dict.fromkeys(("A", "A_90", "A_rms"), float))
+        counts = frame.filter(like="diverged_")
+        frame = frame if counts.sum().any() else frame.drop(columns=counts)
+        frame["model"] = frame["foundation"]
+    except store.STRANGE:
+        raise ResultError(store.OF_ANOTHER, file=folder / store.FOUNDATIONS) from None
     diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
     frame["status"] = ["diverged" if diverged.get(name) else "ok" for name in frame["model"]]
     for name, path in physics.items():

@@ -61,6 +61,8 @@ LENGTHS = ("A_end", "A_end_90", "A", "A_90", "A_rms", "H_end", "H_end_90", "H", 
 UNITS = {**dict.fromkeys(LENGTHS, "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
 SHARDS = "shards"
+STRANGE = (TypeError, ValueError, KeyError, AttributeError)  # what a table raises of entries of another kind
+OF_ANOTHER = "has entries that this shipid does not write: read report.html, and run the study again into a new folder"
 SIMULATORS_FILE, TABLES = "simulators.json", "tables"  # those of others, and the tables of paths among them
 
 
@@ -220,7 +222,7 @@ def stored_plan(folder: Path, trust: bool = False) -> Plan:
             remedy = f"install the package, or name `--with` the file, that has its methods and terms: {command}"
         message = f"shipid {__version__} does not take it ({error.message}): {remedy}"
         raise NotTaken(message, file=file, path=error.path) from None
-    except (TypeError, KeyError, AttributeError, ValueError):
+    except STRANGE:
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     if plan.digest != record["digest"]:
         raise ResultError(
@@ -310,16 +312,18 @@ def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
     record, now = provenance(folder), dict(session)
     before = record["sessions"]
     if now not in before[-1:]:
-        others = [one for one in before if one != now]
-        write_json(folder / PROVENANCE, {**record, "sessions": [*others, now]})
+        write_json(folder / PROVENANCE, {**record, "sessions": [*(one for one in before if one != now), now]})
     return differences(before[-1], now) if before else []
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """A sentence per entry in which two sessions differ."""
     one, other = dict(documents.document_leaves(before)), dict(documents.document_leaves(now))
-    changed = [name for name in {**one, **other} if one.get(name) != other.get(name)]
-    return [f"{name} was {one.get(name)}, now {other.get(name)}" for name in changed]
+    return [
+        f"{name} was {one.get(name)}, now {other.get(name)}"
+        for name in {**one, **other}
+        if one.get(name) != other.get(name)
+    ]
 
 
 def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
@@ -328,15 +332,18 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
     Other files, such as copies by a program that synchronises folders, are left out.
     """
     wanted = seals.seal_names(folder) if plan is None else {unit.key for unit in finished_units(folder, plan.units)}
-    files = sorted(file for file in (folder / "batches").glob("*.json") if file.stem in wanted)
-    rows = [row for file in files for row in read_json(file)]
+    rows = [
+        row for file in sorted((folder / "batches").glob("*.json")) if file.stem in wanted for row in read_json(file)
+    ]
     if not rows:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = pd.DataFrame(rows).astype(dict.fromkeys(METRICS, float))
-    pairs = [(name, way.name) for name, way in plan.pairs] if plan is not None else []
-    place = {pair: number for number, pair in enumerate(pairs)}
-    frame["place"] = [place.get(pair, 0) for pair in zip(frame["foundation"], frame["method"], strict=True)]
-    return frame.sort_values(["N_D", "seed", "place"], kind="stable").drop(columns="place").reset_index(drop=True)
+    place = {(name, way.name): number for number, (name, way) in enumerate(plan.pairs if plan is not None else ())}
+    try:
+        frame = pd.DataFrame(rows).astype(dict.fromkeys(METRICS, float))
+        frame["place"] = [place.get(pair, 0) for pair in zip(frame["foundation"], frame["method"], strict=True)]
+        return frame.sort_values(["N_D", "seed", "place"], kind="stable").drop(columns="place").reset_index(drop=True)
+    except STRANGE:
+        raise ResultError(OF_ANOTHER, file=folder / "batches") from None
 
 
 def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = True) -> Path:

@@ -40,6 +40,7 @@ ASKED = {
     "gpu": 1,
     "kernel": 1,
     "peers": 1,
+    "memory": 1,
 }  # the same, only where named: they take minutes and are no matter of time, or need a GPU
 GROUPS = THREADS | ASKED
 RESULTS = Path("results/bench.json")

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.faults import clusters, documents, folders
+from tests.faults import clusters, documents, folders, foundations, recordings
 from tests.faults.trials import HANG, Outcome, outcomes
 
 
@@ -31,6 +31,12 @@ ROWS: dict[str, Row] = {
     "mapping": Row(documents.mapping, 400, "mutated text"),
     "chain": Row(documents.chain, 40, "patches on patches"),
     "log": Row(documents.log, 1000, "mutated text"),
+    **{f"{one} log": Row(recordings.recording(one), 500, "damaged, sizes forged", 60.0) for one in recordings.SOUND},
+    "exchanged log": Row(recordings.exchanged, 100, "a link led elsewhere while it is read"),
+    "fmu": Row(foundations.fmu, 500, "code, description, archive, table", 60.0),
+    "function": Row(foundations.function, 500, "results, errors, arguments changed"),
+    "predictions": Row(foundations.predictions, 500, "rows and columns changed"),
+    "package": Row(foundations.package, 300, "entry points and members", 60.0),
     "predictor": Row(folders.predictor, 300, "arrays and header changed"),
     "dataset": Row(folders.dataset, 300, "columns and metadata changed"),
     "damaged": Row(folders.damaged, 1000, "files of a folder changed", 60.0),
@@ -38,7 +44,16 @@ ROWS: dict[str, Row] = {
     "full": Row(folders.full, 200, "limit of file size, and intercepted calls", 200.0),
     "together": Row(folders.together, 60, "processes", 300.0),
     "two plans": Row(folders.two_plans, 60, "processes", 300.0),
+    "starts": Row(folders.many_starts, 20, "twenty processes at once", 300.0),
+    "shards": Row(folders.shards, 500, "SIGKILL, and files changed", 300.0),
+    "user": Row(folders.another_user, 200, "files of another user, or read only", 200.0),
+    "clock": Row(folders.clocks, 200, "the time jumps, files are of the future", 200.0),
+    "version": Row(folders.another_version, 500, "keys of another version, sealed", 60.0),
+    "ships": Row(folders.ships, 500, "SIGKILL, and files changed", 60.0),
+    "exported": Row(documents.sanitized, 60, "gcc -fsanitize=address,undefined", 120.0),
+    "options": Row(documents.options, 500, "of expect and vessel similar"),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
+    "worker": Row(clusters.worker_lost, 12, "one of two killed, stopped, stopped for a while", 300.0),
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }
 EVERY = 30.0  # s between lines of progress

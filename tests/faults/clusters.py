@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import re
 import signal
@@ -11,10 +12,11 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
+from unittest.mock import patch
 
 from shipid.errors import ShipidError
 from shipid.study.run import run_study
-from tests.faults.folders import _continued, a_place, reference
+from tests.faults.folders import _continued, _same_as_reference, a_place, reference
 from tests.faults.trials import Failure
 from tests.study.tiny import tiny_plan
 
@@ -54,6 +56,23 @@ def _address(log: Path) -> str:
             return match[1]
         time.sleep(0.1)
     raise Failure("no cluster", log.read_text()[-500:])
+
+
+def worker_lost(seed: int) -> None:
+    """One of two workers is killed, stopped, or stopped for a while: the other does its work, to the same digits."""
+    rng = random.Random(f"worker {seed}")
+    reference()
+    with a_place() as place, patch.dict(os.environ, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="45s"):
+        with a_cluster(place, 2) as (address, processes):
+            plan, victim = tiny_plan(place), rng.choice(processes[1:])
+            how, after = ["killed", "stopped", "paused"][seed % 3], rng.choice(["start", "cell"])
+            for event in run_study(plan, place / "run", scheduler=address):
+                if event.kind == after:
+                    victim.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+                    if how == "paused":
+                        time.sleep(rng.choice([0.5, 3.0]))
+                        victim.send_signal(signal.SIGCONT)
+        _same_as_reference(place / "run", f"a worker {how} at {after}")
 
 
 def died(seed: int) -> None:

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import random
+import re
+import resource
 import tempfile
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from typer.testing import CliRunner
 
+from shipid.cli import app
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
+from shipid.exchange.ships import draw_ship
+from shipid.export.c_predictor import predictor_files
+from shipid.export.c_vessel import vessel_files
+from shipid.export.model import build_model
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.study.plan import plan_text, read_plan
@@ -19,6 +27,8 @@ from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
+from tests.export.compiled import SANITIZERS, run_example
+from tests.export.strange import KINDS, drawn
 from tests.faults.mutations import mutated
 from tests.faults.trials import Failure
 from tests.study.tiny import whole_unit
@@ -64,6 +74,22 @@ def mapping(seed: int) -> None:
         parsed = read_mapping(file)
         with patch("shipid.logs.catalogue.fetch_log", side_effect=AssertionError):
             import_log(parsed, BAD / "logs" / "good.csv")
+
+
+def sanitized(seed: int) -> None:
+    """The exported C of a drawn predictor, or of a drawn ship, runs under sanitizers of addresses and arithmetic."""
+    rng = random.Random(f"sanitized {seed}")
+    most = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))  # sanitizers reserve terabytes
+    if seed % 2:
+        files = vessel_files(draw_ship(seed, 0).vessel(), "ship", rng.choice(["rk4", "euler"]))
+    else:
+        draws = (drawn(rng.choice(KINDS), rng.randrange(10**6)) for _ in range(100))
+        files = predictor_files(
+            build_model(next(one for one in draws if one.predictor.physics.observer is None).predictor), "odd"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        run_example(files, Path(folder), *SANITIZERS)
 
 
 def chain(seed: int) -> None:
@@ -157,3 +183,27 @@ def memory(seed: int) -> None:
                 raise Failure("no line of an error", str(error)) from None
             return
         raise Failure("not refused", f"{path} = {value:g}")
+
+
+VALUES = ["nan", "inf", "-inf", "-1", "0", "-0.0", "1e308", "1e-308", "5e-324", "x", "", "1e400", "9" * 400, "\x1b[2J"]
+OPTIONS = {
+    "expect": {"--length": "120", "--speed": "7", "--A": "3", "--runs": "12", "--ahead": "2", "--kind": "template"},
+    "vessel similar": {
+        **{"--length": "90", "--beam": "15", "--draught": "5", "--block": "0.7", "--speed": "6", "--number": "2"},
+        "--vessel": "mariner",
+    },
+}
+
+
+def options(seed: int) -> None:
+    """A question on ships with one to three options that nobody expects: one line, or an answer in numbers."""
+    rng = random.Random(f"options {seed}")
+    words = rng.choice(list(OPTIONS))
+    given = {name: value for name, value in OPTIONS[words].items() if rng.random() < 0.7}
+    for name in rng.sample(list(OPTIONS[words]), rng.choice([1, 1, 2, 3])):
+        given[name] = rng.choice([*VALUES, str(float(f"{10 ** rng.uniform(-6, 6):.3g}"))])
+    result = CliRunner().invoke(app, [*words.split(), *(f"{name}={value}" for name, value in given.items())])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    if result.exit_code == 0 and re.search(r"\b(nan|inf)\b", result.output):
+        raise Failure("no number", str(given), result.output[:300])

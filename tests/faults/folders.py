@@ -21,20 +21,23 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
+from shipid.exchange import campaign as ships_study
 from shipid.files import TEMPORARY
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.check import check_folder
 from shipid.study.lock import has_writer
 from shipid.study.results import read_results
-from tests.faults.trials import Failure
+from shipid.study.run import prepare_study, run_study
+from tests.faults.trials import PATIENCE, Failure
 from tests.study.tiny import run_here as run_in_process
-from tests.study.tiny import tiny_plan
+from tests.study.tiny import tiny_plan, without_workers
 
 PLACE = "/dev/shm" if Path("/dev/shm").is_dir() else None
 """Where the folders of trials are: in memory, where syncing takes no time."""
@@ -141,7 +144,7 @@ def start(work: Callable[[], Any]) -> int:
 
 def finish(process: int, limit: float = 60.0) -> int:
     """Exit code of a process; it is killed after a limit [s], which is a failure."""
-    end = time.monotonic() + limit
+    end = time.monotonic() + PATIENCE * limit
     while time.monotonic() < end:
         done, status = os.waitpid(process, os.WNOHANG)
         if done:
@@ -197,6 +200,11 @@ def killed(seed: int) -> None:
 
 
 def _stopped(plan: Any, folder: Path, at: int, when: str) -> None:
+    _killed_at(at, lambda: run_here(plan, folder), when)
+
+
+def _killed_at(at: int, work: Callable[[], Any], when: str = "after") -> None:
+    """Do work that is killed before, within or after the call `at` that changes a folder."""
     count = [0]
 
     def stop(name: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
@@ -211,7 +219,7 @@ def _stopped(plan: Any, folder: Path, at: int, when: str) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
     with intercepted(stop):
-        run_here(plan, folder)
+        work()
 
 
 def full(seed: int) -> None:
@@ -268,6 +276,218 @@ def together(seed: int) -> None:
         if child(lambda: run_here(other, place / "run")) != 1:
             raise Failure("mixed", "another plan was not refused")
         _same_as_reference(place / "run", "after another plan")
+
+
+def many_starts(seed: int) -> None:
+    """Twenty runs of one plan in one folder at the same moment, two of them killed: nothing is mixed."""
+    rng = random.Random(seed)
+    with a_place() as place:
+        plan, gate = tiny_plan(place), time.monotonic() + 0.3
+
+        def begin() -> None:
+            time.sleep(max(0.0, gate - time.monotonic()))
+            run_here(plan, place / "run")
+
+        runs = [start(begin) for _ in range(20)]
+        for one in rng.sample(runs, 2):
+            time.sleep(rng.choice([0.0, 0.3, 0.5]))
+            with suppress(ProcessLookupError):
+                os.kill(one, signal.SIGKILL)
+        codes = {finish(one) for one in runs}
+        if not codes <= {0, 1, -signal.SIGKILL}:
+            raise Failure("not one alone", f"exit codes {sorted(codes)}")
+        _continued(place, "twenty runs at once")
+
+
+def shards(seed: int) -> None:
+    """Shards of a plan in processes, killed or damaged, begun again and taken in by a run that may be killed, too."""
+    rng, calls, count = random.Random(seed), reference()[2], random.Random(seed).choice([1, 2, 3])
+    with a_place() as place:
+        plan, folder = tiny_plan(place), place / "run"
+        for _ in prepare_study(plan, folder):
+            pass
+
+        def shard(number: int) -> None:
+            with without_workers(), patch("shipid.study.run.import_for_workers", lambda: None):
+                for _ in run_study(plan, folder, shard=(number, count)):
+                    pass
+
+        words = []
+        for number in range(1, count + 1):
+            for _ in range(rng.choice([0, 1, 1])):
+                at = rng.randrange(calls)
+                words.append(f"shard {number} of {count} killed at call {at}")
+                child(lambda number=number, at=at: _killed_at(at, lambda: shard(number)))  # type: ignore[misc]
+            if rng.random() < 0.8 and child(lambda number=number: shard(number)):  # type: ignore[misc]
+                raise Failure("not resumed", *words)
+        if rng.random() < 0.4 and any((folder / "shards").glob("*/*.toml")):
+            words.append(_damage(folder / "shards", rng))
+        elif rng.random() < 0.6:
+            at = rng.randrange(calls)
+            words.append(f"killed at call {at}")
+            child(lambda: _stopped(plan, folder, at, rng.choice(["before", "within", "after"])))
+        run_here(plan, folder)  # a refusal ends the trial here
+        shutil.rmtree(folder / "shards", ignore_errors=True)
+        _same_as_reference(folder, ", ".join(words))
+
+
+def another_user(seed: int) -> None:
+    """The folder belongs to somebody else, or can only be read: one line, not a byte is changed, and it can be read."""
+    rng = random.Random(seed)
+    if os.getuid():
+        return  # nobody can be somebody else
+    with a_place() as place:
+        place.chmod(0o755)
+        finished = rng.random() < 0.5
+        if finished:
+            shutil.copytree(reference()[0], place / "run")
+        else:
+            at = rng.randrange(reference()[2] // 4, reference()[2])
+            child(lambda: _stopped(tiny_plan(place), place / "run", at, "after"))
+        theirs, kind = tiny_plan(place), rng.choice(["root's", "root's, some files one's own", "one's own, read only"])
+        every = [place, *place.rglob("*")]
+        for one in every if kind != "root's" else ():
+            if rng.random() < 0.5 or kind.endswith("only"):
+                os.chown(one, 65534, 65534, follow_symlinks=False)
+                one.chmod(0o555 if one.is_dir() else 0o444) if kind.endswith("only") else None
+        before = {one: one.read_bytes() for one in every if one.is_file()}
+
+        def visit() -> None:
+            os.setgroups([])
+            os.setgid(65534)
+            os.setuid(65534)
+            with suppress(ShipidError):
+                read_results(place / "run")
+            with suppress(ShipidError):
+                check_folder(place / "run")
+            run_here(theirs, place / "run")
+
+        code = child(visit)
+        if code not in (0, 1):
+            raise Failure("traceback", kind, f"exit code {code}")
+        changed = [one.name for one in before if not one.is_file() or one.read_bytes() != before[one]]
+        if changed and kind != "root's, some files one's own":
+            raise Failure("mixed", kind, *changed)
+        for one in [place, *place.rglob("*")]:
+            os.chown(one, 0, 0, follow_symlinks=False)
+            one.chmod(0o755 if one.is_dir() else 0o644)
+        _continued(place, kind)
+
+
+def clocks(seed: int) -> None:
+    """The clock of the machine jumps by hours to years while a run works and is killed; files are of the future."""
+    rng, calls, now = random.Random(seed), reference()[2], time.time
+    with a_place() as place:
+        plan, shift = tiny_plan(place), [0.0]
+
+        def jump() -> float:
+            if rng.random() < 0.2:
+                shift[0] = rng.choice([-1, 1]) * rng.choice([1e-3, 3600.0, 90000.0, 3e7, 1e9])
+            return now() + shift[0]
+
+        for _ in range(rng.choice([1, 2])):
+            at = rng.randrange(calls)
+            with patch("time.time", jump):
+                child(lambda at=at: _stopped(plan, place / "run", at, "after"))  # type: ignore[misc]
+            for one in place.rglob("*"):
+                moment = now() + rng.choice([-1e9, -90000.0, 0.0, 90000.0, 1e9])
+                os.utime(one, (moment, moment), follow_symlinks=False)
+        with patch("time.time", jump):
+            _continued(place, "a clock that jumps")
+
+
+def another_version(seed: int) -> None:
+    """A folder as of another version, its seals right: refused in one line, or these numbers."""
+    rng = random.Random(seed)
+    with a_place() as place:
+        shutil.copytree(reference()[0], place / "run")
+        folder, words = place / "run", []
+        texts = sorted([*folder.glob("*.json"), *folder.glob("batches/*.json"), folder / "study.toml"])
+        for _ in range(rng.choice([1, 1, 2])):
+            file = rng.choice(texts)
+            words.append(_other_keys(file, rng))
+            for seal in seals.seal_names(folder):
+                seals.write_seal(folder, seal, [folder / name for name in seals.named_files(folder, seal)])
+        what = ", ".join(words)
+        with suppress(ShipidError):
+            read_results(folder).cells.to_csv(place / "x.csv")
+        with suppress(ShipidError):
+            check_folder(folder)
+        run_here(tiny_plan(place), folder)  # a refusal ends the trial here
+        kept = [{file.name for file in (one / "cells").iterdir()} for one in (folder, reference()[0])]
+        if kept[0] != kept[1]:
+            raise Failure("mixed", what)
+
+
+def _other_keys(file: Path, rng: random.Random) -> str:
+    """Give an entry of a JSON or TOML file another name or kind, leave one out, or add one."""
+    if file.suffix == ".toml":
+        lines = file.read_text().splitlines()
+        place = rng.choice([number for number, line in enumerate(lines) if "=" in line])
+        key, _, value = lines[place].partition("=")
+        other = rng.choice([f"{key.strip()}_s = {value}", "", f"{lines[place]}\nnewer = 1", f'{key} = "auto"'])
+        file.write_text("\n".join([*lines[:place], other, *lines[place + 1 :]]) + "\n")
+        return f"{file.name}: {other!r}"
+    content = node = json.loads(file.read_text())
+    while node:
+        key = rng.choice(list(node)) if isinstance(node, dict) else rng.randrange(len(node))
+        if isinstance(node[key], dict | list) and node[key] and rng.random() < 0.7:
+            node = node[key]
+            continue
+        kind = rng.choice(["gone", "renamed", "added", "other"])
+        if kind == "other" or isinstance(node, list):
+            node[key] = rng.choice([None, "x", -1, 2.5, [], {}, True, [1], {"a": 1}])
+        elif kind == "added":
+            node["newer"] = {"a": [1]}
+        else:
+            node |= {f"{key}_s": node[key]} if kind == "renamed" else {}
+            del node[key]
+        break
+    file.write_text(json.dumps(content))
+    return f"{file.name}: {key} {kind}"
+
+
+def ships(seed: int) -> None:
+    """The study over ships, each ship a small table, killed and its files damaged: every ship once, or one line."""
+    rng = random.Random(f"ships {seed}")
+
+    def study(name: str, *_: Any) -> pd.DataFrame:
+        if name == "otter":
+            raise ShipidError("cannot be studied")
+        return pd.DataFrame({"ship": [name], "H": [float(len(name))]})
+
+    def run(at: int) -> None:
+        with patch.object(ships_study, "study_ship", study), without_workers_of_ships():
+            _killed_at(at, lambda: list(ships_study.run_ships(place / "run", 0, 3)))
+
+    with a_place() as place:
+        child(lambda: run(10**6))
+        wanted = pd.read_parquet(place / "run" / "cells.parquet")
+        shutil.rmtree(place / "run")
+        words = []
+        for _ in range(rng.choice([1, 2])):
+            at = rng.randrange(150)
+            words.append(f"killed at call {at}")
+            child(lambda at=at: run(at))  # type: ignore[misc]
+        if rng.random() < 0.6 and (place / "run").is_dir():
+            words.append(_damage(place / "run", rng))
+        code = child(lambda: run(10**6))
+        if code:
+            raise Failure("traceback", *words) if code == 2 else ShipidError("refused")
+        found = pd.read_parquet(place / "run" / "cells.parquet")
+        if (
+            not found.sort_values("ship")
+            .reset_index(drop=True)
+            .equals(wanted.sort_values("ship").reset_index(drop=True))
+        ):
+            raise Failure("mixed", *words)
+
+
+@contextmanager
+def without_workers_of_ships() -> Iterator[None]:
+    """The study over ships computes in this process."""
+    with patch.object(ships_study, "on_workers", lambda work, units, _: ((one, work(one)) for one in units)):
+        yield
 
 
 def two_plans(seed: int) -> None:

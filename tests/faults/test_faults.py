@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from shipid.logs.readers import read_log_table
+from shipid.study.plan import read_plan
+from tests.faults import recordings
 from tests.faults.campaign import ROWS
 from tests.faults.mutations import MUTATIONS, documents, mutated
 from tests.faults.trials import Failure, outcome, outcomes, table
+from tests.logs.conftest import T
 
 QUICK = {
     "study": 12,
@@ -16,6 +22,14 @@ QUICK = {
     "predictor": 15,
     "dataset": 8,
     "memory": 6,
+    "mcap log": 4,
+    "ulg log": 4,
+    "exchanged log": 4,
+    "function": 6,
+    "predictions": 6,
+    "package": 3,
+    "ships": 6,
+    "options": 10,
     "damaged": 4,
     "killed": 3,
 }
@@ -34,6 +48,17 @@ def test_a_few_faults(name: str) -> None:
 def test_a_few_slow_faults(name: str) -> None:
     drawn = [outcome(ROWS[name].trial, seed) for seed in range(2)]
     assert not [one for one in drawn if one.failed], table({name: drawn})
+
+
+@pytest.mark.parametrize("ending", recordings.SOUND)
+def test_a_recording_that_is_not_damaged_is_read(ending: str, tmp_path: Path) -> None:
+    write, form = recordings.SOUND[ending]
+    assert len(read_log_table(write(tmp_path), form, "time")) >= len(T)
+
+
+def test_the_study_with_every_block_is_sound() -> None:
+    """It was not for a while, and no mutation of it was ever run."""
+    assert read_plan(documents("study")["rich"]).study.cost is not None
 
 
 def test_mutations_are_drawn_by_seed() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import resource
 import time
 import traceback
@@ -12,9 +13,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from shipid.errors import ShipidError
+from shipid.cli import error_line
 
 HANG = 20.0  # s of processor or wall time that no trial may take
+PATIENCE = float(os.environ.get("FAULTS_PATIENCE", "1"))  # times the limits, on a machine that others use
 MEMORY = 12 << 30  # bytes of address space of a trial
 
 
@@ -43,6 +45,7 @@ class Failure(Exception):
 def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HANG) -> Iterator[Outcome]:
     """Outcome of each trial; `work` is called with its seed in a forked process, which a hanging trial ends."""
     context: Any = multiprocessing.get_context("fork")
+    limit *= PATIENCE
     left = list(seeds)
     while left:
         here, there = context.Pipe()
@@ -68,7 +71,7 @@ def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HA
 
 
 def _serve(pipe: Connection, work: Callable[[int], Any], seeds: Sequence[int]) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
     for seed in seeds:
         pipe.send(outcome(work, seed))
     pipe.close()
@@ -78,16 +81,14 @@ def outcome(work: Callable[[int], Any], seed: int) -> Outcome:
     """Outcome of one trial in this process."""
     try:
         work(seed)
-    except ShipidError as error:
-        line = str(error)
-        good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
-        return Outcome(seed, "refused" if good else "no line", line)
     except Failure as error:
         return Outcome(seed, str(error.args[0]), " ".join(map(str, error.args[1:])))
-    except OSError as error:
-        if error.filename is not None or error.strerror:  # the command line writes these in one line
-            return Outcome(seed, "refused", f"{error.filename}: {error.strerror}")
-        return Outcome(seed, "traceback", _short(error))
+    except Exception as error:
+        line = error_line(error)
+        if line is None:
+            return Outcome(seed, "traceback", _short(error))
+        good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
+        return Outcome(seed, "refused" if good else "no line", line)
     except BaseException as error:
         return Outcome(seed, "traceback", _short(error))
     return Outcome(seed, "sound")

@@ -52,13 +52,12 @@ def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, A
     for kind, reader in READERS.load_all().items():
         try:
             form = reader.detect(file, head) if reader.detect else None
+            if form is not None:
+                return form | {"kind": kind} | ({"topics": list(names)} if reader.topics and names else {})
         except Exception as error:
             if not is_user_code(reader.read):
                 raise
             log_warning(f"the reader {kind!r} is left out: {describe_error(error)}")
-            continue
-        if form is not None:
-            return form | ({"topics": list(names)} if reader.topics and names else {})
     other = foreign_format(head)
     if other is not None:
         raise DataError(other.sentence, file=file)
