@@ -55,7 +55,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from itertools import pairwise, product
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -395,12 +395,8 @@ class _Log:
         """
         z, fold = self.plain_residuals, self.block % FOLDS
         force = (z[0] + 1j * z[1]) / self.turn
-        left = force.copy()
-        for run, out in product(set(self.motion.runs), range(FOLDS)):
-            judged, kept = ((self.run == run) & here for here in (fold == out, fold != out))
-            if judged.any() and kept.any():
-                left[judged] -= force[kept].mean()
-        left = left * self.turn
+        others = (self.run[:, None] == self.run) & (fold[:, None] != fold)
+        left = (force - others @ force / np.maximum(others.sum(axis=1), 1)) * self.turn
         forced = np.array([left.real, left.imag, *z[2:]])
         less, error = self.gain((forced, self.plain_errors), (fit.left_out, self.plain_errors))
         return less > APART * error
@@ -445,8 +441,7 @@ class _VesselLog(_Log):
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log, whose actuators and forces are kept."""
-        kept = self.memory(motion), self.forces(motion)
-        self.motion, self._kept = motion, kept
+        self._kept = self.memory(motion), self.forces(motion)
         super().repair(motion)
 
     def causes(self) -> list[Cause]:
