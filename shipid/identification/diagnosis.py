@@ -44,7 +44,8 @@ makes them err is seen on the log with its noise once more.
   of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
   `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
 - Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
-- `current by run` must lower the misfit more than an unknown force of each run does, as of a wind that the log lacks.
+- `current by run` must lower the misfit more than an unknown force of each run, such as a wind that the log lacks, and
+  by more than the share `ALIKE` than any other cause.
 - A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
   naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
   as well.
@@ -388,18 +389,19 @@ class _Log:
         before, after = ((z[3:] ** 2).mean(axis=1) + self.noise[3:] ** 2 for z in (self.plain_residuals, fit.left_out))
         return fit.counts and bool(np.log(before / after).sum() / 2 > PLAIN)
 
-    def beats_forces(self, fit: _Fit) -> bool:
-        """Whether a cause lowers the misfit more than an unknown force of each run, towards north and east.
+    def needs_runs(self, fit: _Fit, rest: float) -> bool:
+        """Whether a cause by run gains more than an unknown force of each run, and than another with misfit `rest`.
 
-        A wind that the log lacks is one. It is estimated without the blocks that it is judged on.
+        The force is one towards north and east, as a wind, estimated without the blocks that it is judged on.
         """
         z, fold = self.plain_residuals, self.block % FOLDS
         force = (z[0] + 1j * z[1]) / self.turn
         others = (self.run[:, None] == self.run) & (fold[:, None] != fold)
-        left = (force - others @ force / np.maximum(others.sum(axis=1), 1)) * self.turn
-        forced = np.array([left.real, left.imag, *z[2:]])
+        force = (force - others @ force / np.maximum(others.sum(axis=1), 1)) * self.turn
+        forced = np.array([force.real, force.imag, *z[2:]])
         less, error = self.gain((forced, self.plain_errors), (fit.left_out, self.plain_errors))
-        return less > APART * error
+        more = self.misfit(z) - rest < (1 - ALIKE) * (self.misfit(z) - self.misfit(fit.left_out))
+        return bool(more and less > APART * error)
 
     def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
         """By how much one misfit is lower than another, and the standard error over blocks of time.
@@ -664,7 +666,12 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
-    fits = {key: fit for key, fit in fits.items() if not fit.cause.of_runs or log.beats_forces(fit)}
+    rest = min(log.misfit(z) for z in (base, *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
+    fits |= {
+        key: replace(fit, cause=replace(fit.cause, cost=np.inf))
+        for key, fit in fits.items()
+        if fit.cause.of_runs and not log.needs_runs(fit, rest)
+    }
     misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
