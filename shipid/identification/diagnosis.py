@@ -400,8 +400,7 @@ class _Log:
         force = (force - others @ force / np.maximum(others.sum(axis=1), 1)) * self.turn
         forced = np.array([force.real, force.imag, *z[2:]])
         less, error = self.gain((forced, self.plain_errors), (fit.left_out, self.plain_errors))
-        more = self.misfit(z) - rest < (1 - ALIKE) * (self.misfit(z) - self.misfit(fit.left_out))
-        return bool(more and less > APART * error)
+        return less > APART * error and self.misfit(fit.left_out) < rest - ALIKE * (self.misfit(z) - rest)
 
     def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
         """By how much one misfit is lower than another, and the standard error over blocks of time.
