@@ -44,7 +44,8 @@ makes them err is seen on the log with its noise once more.
   of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
   `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
 - Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
-- `current by run` gains only what is beyond an unknown force of each run, as gusts are.
+- `current by run` must lower the misfit more than an unknown force of each run, such as a wind that the log lacks, and
+  by more than the share `ALIKE` than any other cause.
 - A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
   naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
   as well.
@@ -55,7 +56,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from itertools import pairwise, product
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -388,18 +389,18 @@ class _Log:
         before, after = ((z[3:] ** 2).mean(axis=1) + self.noise[3:] ** 2 for z in (self.plain_residuals, fit.left_out))
         return fit.counts and bool(np.log(before / after).sum() / 2 > PLAIN)
 
-    def gain_of_forces(self, z: Array) -> float:
-        """By how much an unknown force of each run, ahead and aside, lowers the misfit of z (6, W) and of paths.
+    def needs_runs(self, fit: _Fit, rest: float) -> bool:
+        """Whether a cause by run gains more than an unknown force of each run, and than another with misfit `rest`.
 
-        Gusts are one, and so is what the vessel lacks. It is estimated without the blocks that it is judged on; paths
-        weigh as the two equations do.
+        The force is one towards north and east, as a wind, estimated without the blocks that it is judged on.
         """
-        left, fold = z.copy(), self.block % FOLDS
-        for run, out in product(set(self.motion.runs), range(FOLDS)):
-            judged, kept = ((self.run == run) & here for here in (fold == out, fold != out))
-            if judged.any() and kept.any():
-                left[:2, judged] -= z[:2, kept].mean(axis=1, keepdims=True)
-        return 2 * max(self.misfit(z) - self.misfit(left), 0.0)
+        z, fold = self.plain_residuals, self.block % FOLDS
+        force = (z[0] + 1j * z[1]) / self.turn
+        others = (self.run[:, None] == self.run) & (fold[:, None] != fold)
+        force = (force - others @ force / np.maximum(others.sum(axis=1), 1)) * self.turn
+        forced = np.array([force.real, force.imag, *z[2:]])
+        less, error = self.gain((forced, self.plain_errors), (fit.left_out, self.plain_errors))
+        return less > APART * error and self.misfit(fit.left_out) < rest - ALIKE * (self.misfit(z) - rest)
 
     def gain(self, worse: tuple[Array, Array], better: tuple[Array, Array]) -> tuple[float, float]:
         """By how much one misfit is lower than another, and the standard error over blocks of time.
@@ -441,8 +442,7 @@ class _VesselLog(_Log):
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log, whose actuators and forces are kept."""
-        kept = self.memory(motion), self.forces(motion)
-        self.motion, self._kept = motion, kept
+        self._kept = self.memory(motion), self.forces(motion)
         super().repair(motion)
 
     def causes(self) -> list[Cause]:
@@ -665,13 +665,17 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
-    cost = {cause.key: cause.cost for cause in causes}
-    cost |= {cause.key: cost[cause.key] + log.gain_of_forces(base) for cause in causes if cause.of_runs}
-    misfits = {key: log.misfit(fit.left_out) + cost[key] - log.misfit(base) for key, fit in fits.items()}
+    rest = min(log.misfit(z) for z in (base, *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
+    fits |= {
+        key: replace(fit, cause=replace(fit.cause, cost=np.inf))
+        for key, fit in fits.items()
+        if fit.cause.of_runs and not log.needs_runs(fit, rest)
+    }
+    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     plain = base, log.path_errors(log.motion)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
-    misfits |= {key: cost[key] - log.gain(plain, one)[0] for key, one in seen.items()}
+    misfits |= {key: fits[key].cause.cost - log.gain(plain, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
     before, missed = log.beyond_noise(plain[1]), float(plain[1].mean())
     gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
@@ -695,7 +699,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):
         sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
         return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=sentence + cause.remedy), best
-    equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in fits)]))
+    equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in first)]))
     return _describe(replace(result, cause=cause.name, equals=equals), best), best
 
 

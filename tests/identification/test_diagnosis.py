@@ -122,12 +122,13 @@ def test_coefficients_are_named_as_a_class() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_currents_of_runs_are_told_from_winds(seed: int) -> None:
-    """Neither is logged; a wind of each run was called a current."""
+def test_currents_of_runs_are_told_from_winds_and_from_one(seed: int) -> None:
+    """None is logged; a wind of each run was called a current, and one current of all runs another in each."""
     random, sea = np.random.default_rng(seed), SHIP.with_values({"current.kind": "uniform"})
     towards, current, wind = (random.uniform(*ends, 6) for ends in ((-3, 3), (0.1, 0.4), (10, 18)))
     for weather, cause in (
         ({"V_c": current, "beta_c": towards}, "current by run"),
+        ({"V_c": current[:1].repeat(6), "beta_c": towards[:1].repeat(6)}, "current"),
         ({"V_w": wind, "beta_w": towards}, NONE),
     ):
         log = noisy(trials(sea, steps=90, seed=seed, weather=weather), NOISE, seed)
