@@ -98,7 +98,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
 def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
     """Write the pages of one run."""
     results = read_results(folder, say)
-    if not seals.is_sealed(folder, store.RESULTS):
+    if not (results.complete and seals.is_sealed(folder, store.RESULTS)):
         store.write_results(folder, results.plan, results.cells, whole=results.complete)
     if say is not None:
         say(f"{results.plan.name}: answer, findings and tables of {len(results.cells)} cells")
