@@ -121,13 +121,14 @@ def nearest_curve(train: pd.DataFrame, rows: pd.DataFrame) -> np.ndarray:
 
 def judge(cells: pd.DataFrame, law: ExchangeLaw) -> None:
     """Print how well ships and types that were left out are foretold, by the law and its rivals."""
-    part, linear, rows_of = (
-        law.parts["H"],
+    linear, rows_of = (
         FORM._replace(features=(*FORM.features, "p", "p:n", *NO_PHYSICS), floor=()),
         dict(tuple(response_rows(FORM, cells).groupby("ship", sort=False))),
     )
-    designs = {form: ship_designs(form, cells) for form in (FORM, linear)}
-    starts = {FORM: part, linear: fit_hierarchy(linear, [*designs[linear].values()])}
+    forms = {name: one.response for name, one in law.parts.items()}
+    designs = {form: ship_designs(form, cells) for form in (*forms.values(), linear)}
+    starts = {form: law.parts[name] for name, form in forms.items()}
+    starts[linear] = fit_hierarchy(linear, [*designs[linear].values()])
     scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     gains: dict[str, list[np.ndarray]] = {}  # log scores, larger is better, less a constant
     table, inside_biases, process = [], [], GaussianProcess(cells)
@@ -156,7 +157,7 @@ def judge(cells: pd.DataFrame, law: ExchangeLaw) -> None:
         first = rows["N_D"].isin(sorted(rows["N_D"].unique())[:FIRST])
         mean, half, _ = interval_of(one, rows[~first], rows[first])
         note("law, first three amounts given", value[~first] - mean, half)
-        begun = replace(law, parts={**law.parts, "H": one})
+        begun = replace(law, parts={name: fit_without(form, {ship}) for name, form in forms.items()} | {"H": one})
         note("law, first three amounts given, floor not known", *foretell_begun(begun, rows))
     for _, group in cells.groupby("type"):
         absent = {*group["ship"]}

@@ -22,7 +22,7 @@ from shipid.errors import DivergenceError, ResultError, ShipidError
 from shipid.exchange.ships import Dice, DrawnShip, draw_ship
 from shipid.files import read_json, write_json, write_table
 from shipid.metrics import position_error
-from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
+from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.study.declared import NO_MODEL
 from shipid.study.new import draft_simulated
 from shipid.study.plan import Plan, build_plan
@@ -34,6 +34,7 @@ from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
 from shipid.vessel.similar import similar_vessels, vessel_particulars
+from shipid.vessel.stability import service_shaft
 from shipid.vessel.template import Particulars, first_guess
 
 BUNDLED = {
@@ -106,7 +107,7 @@ def _known_particulars(vessel: Vessel) -> Particulars | None:
         return None
     signals = {name.rpartition(".")[2] for name in controls.commands}
     propulsor = "azimuth" if "alpha" in signals else "propeller-rudder" if "delta" in signals else "differential"
-    n = balanced_shaft(controls, U)
+    n = service_shaft(vessel, U)
     L, B, T, block = (known[name] for name in ("L_pp", "B", "T", "C_b"))
     return Particulars(L, B, T, block, U, propulsor, rpm=None if n is None else 60 * n, shafts=len(controls.drives))
 

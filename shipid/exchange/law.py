@@ -423,6 +423,7 @@ class ExchangeLaw:
         """
         rng, own = np.random.default_rng(seed), self._own_rows()
         cells, floors = _cells_to_draw(ship, foundations, ahead, self.own), np.ones(1)
+        cells["floor"] = cells["floor"].fillna(cells["A"][cells["kind"] == "nominal"].mean())
         many = cells.drop(columns=["ship", "foundation"]).loc[np.tile(cells.index, draws)].reset_index(drop=True)
         many["kind"] = pd.Categorical(many["kind"].where(many["kind"] != ANY, rng.choice(FLAWS, len(many))))
         for name in ("baseline", "floor", "A"):
@@ -432,7 +433,8 @@ class ExchangeLaw:
                 name, cells[unknown], many[np.tile(unknown, draws)], draws, rng, known, floors, ship.sea
             )
             if name == "floor":  # no physics is better than the true one
-                values = np.fmin(values, cells["A"].min())
+                least = [*cells["A"], *([] if own is None else own["A"][np.isclose(own["ahead"], ahead)])]
+                values = np.fmin(values, np.fmin.reduce(least))
             if name == "floor" and own is not None and values.size:
                 values, floors = self._likely_floors(values, own, rng)
             many.loc[np.tile(unknown, draws), name] = values.ravel()

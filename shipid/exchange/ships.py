@@ -16,7 +16,7 @@ import numpy as np
 
 from shipid.document import bundled_documents, read_document, value_at_path
 from shipid.errors import ShipidError
-from shipid.simulation.approach import Controls, balanced_shaft
+from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import ConstantOrders
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import DEGREE, GRAVITY
@@ -24,7 +24,7 @@ from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.perturb import uniform_draw
 from shipid.vessel.regressions import ittc_friction
 from shipid.vessel.similar import TAYLOR
-from shipid.vessel.stability import yaw_growth
+from shipid.vessel.stability import service_shaft, yaw_growth
 from shipid.vessel.template import NU, RHO_AIR, RHO_SEA, Particulars
 
 Ends = tuple[float, float]
@@ -118,7 +118,7 @@ def draw_ship(seed: int, number: int) -> DrawnShip:
         dice = Dice((seed, "ship", number, counter))
         ship = DrawnShip(f"drawn-{number:02d}", kind, _draw_particulars(SHIP_TYPES[kind], dice), dice)
         if holds_turn(vessel := ship.vessel(), ship.particulars):
-            n = balanced_shaft(Controls(vessel), ship.particulars.service) or 0.0
+            n = service_shaft(vessel, ship.particulars.service) or 0.0
             return replace(ship, particulars=replace(ship.particulars, rpm=60 * n))
     raise ShipidError(f"no ship of {MOST_DRAWS} draws of type {kind} holds a turn: take another seed")
 
@@ -144,7 +144,7 @@ def holds_turn(vessel: Vessel, given: Particulars) -> bool:
     """Whether the ship reaches its speed, is not too unstable, and turns steadily to the side of its helm."""
     controls, service = Controls(vessel), given.service
     try:
-        n = balanced_shaft(controls, service)
+        n = service_shaft(vessel, service)
         if n is None:
             return False
         unit = given.length / service

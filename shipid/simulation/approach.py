@@ -160,11 +160,6 @@ def vessel_service_speed(vessel: Vessel) -> float:
     return float(given or FROUDE * np.sqrt(GRAVITY * _length_or_usual(vessel)))
 
 
-def balanced_shaft(controls: Controls, speed: float) -> float | None:
-    """Shaft speed [rev/s] at which a ship straight ahead at a speed [m/s] keeps it; None if there is none."""
-    return service_shaft(controls.vessel, speed)
-
-
 class NotStraight(ShipidError):
     """The ship does not go straight ahead with the helm amidships."""
 

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+LONGEST_CHAIN = 20  # documents that extend or patch one another
 FOUR_QUADRANT = "thruster.four_quadrant"
 MOST_BLOCK = 2.0  # m / (rho L_pp B T), as `LEAST_BLOCK`: far beyond any ship and its degraded models
 
@@ -240,6 +241,10 @@ def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Pat
         other = documents.find_document(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+    if len(above) >= LONGEST_CHAIN:
+        raise DocumentError(
+            f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out", file=file, path=path
+        )
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other

@@ -159,6 +159,8 @@ def test_an_accurate_physics_tells_of_a_low_floor(law):
     asked = UnseenShip(100.0, 7.0, baseline=50.0)
     alone, beside = (law.expect_all(asked, kinds, [64], 2.0, 1000)[:, 0, 0] for kinds in (["high"], ["high", 1.0]))
     assert np.median(beside) < 0.7 * np.median(alone)
+    true = law.expect_all(asked, [("nominal", 3.0), "nominal"], [0], 2.0, 100)
+    assert np.allclose(true, 3.0)  # the floor itself
 
 
 def test_a_law_is_written_and_read(law, tmp_path):

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from shipid.exchange.ships import SHIP_TYPES, Dice, DrawnShip, _linear_derivatives, draw_ship
-from shipid.simulation.approach import Controls, balanced_shaft
+from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import ConstantOrders
 from shipid.simulation.perform import perform_manoeuvres
+from shipid.vessel.stability import service_shaft
 from shipid.vessel.template import Particulars, first_guess
 
 SEED = 611  # no record has it
@@ -66,7 +67,7 @@ def test_a_ship_turns_to_the_side_of_its_helm_and_loses_speed(fleet: list[DrawnS
 def test_the_shaft_speed_of_the_particulars_holds_the_service_speed(fleet: list[DrawnShip]) -> None:
     for ship in fleet:
         given, vessel = ship.particulars, ship.vessel()
-        n = balanced_shaft(Controls(vessel), given.service)
+        n = service_shaft(vessel, given.service)
         assert given.rpm == pytest.approx(60 * float(n or 0))
 
 

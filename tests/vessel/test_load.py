@@ -77,6 +77,15 @@ def test_patches_may_be_stacked(tmp_path: Path) -> None:
     assert (vessel.name, vessel.key) == ("upper", "upper")
 
 
+def test_a_long_chain_of_documents_is_one_line(tmp_path: Path) -> None:
+    for number in range(30):
+        base = f"./{number + 1}.toml" if number < 29 else "gunnerus-28.9"
+        (tmp_path / f"{number}.toml").write_text(f'name = "x"\nextends = "{base}"\n')
+    with pytest.raises(DocumentError, match="a chain of more than 20 documents: write the vessel out"):
+        load_vessel(str(tmp_path / "0.toml"))
+    assert load_vessel(str(tmp_path / "15.toml")).name == "x"
+
+
 def test_a_block_of_another_kind_is_replaced_whole(tmp_path: Path) -> None:
     """What stayed of the other kind was refused as an unknown key that the file does not have: a wind has one block."""
     windy, geared = tmp_path / "windy.toml", tmp_path / "geared.toml"
