@@ -243,8 +243,11 @@ def _take_thrust(state: State, name: str, signal: str, azimuth: bool, used: dict
             extra = {**extra, "sign": -1}
             why += "; negative while the ship goes ahead"
         if not tunnel and _hides_astern(state, name):
-            words = f"{name!r} is never negative, but turns while the ship goes astern: which column says its sense"
-            state.ask(("n",), f"{words}? Without one its turns astern are taken as ahead")
+            state.ask(
+                ("n",),
+                f"{name!r} is never negative, but turns while the ship goes astern, or stops: which column says its "
+                "sense? Without one its turns astern are taken as ahead",
+            )
     state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
 
 
@@ -266,8 +269,9 @@ def _unit_of_shaft(
     if written is not None:
         unit = written if tunnel or not np.isfinite(cost[unit]) else unit
         if unit == written != "rad/s" and top * to_si(unit, "propeller.n") > GEARED and is_engine(name):
-            words = f"{begins} {unit}, is the speed of an engine: is there a gear? Write factor = 1 / its ratio"
-            state.ask(about, words)
+            state.ask(
+                about, f"{begins} {unit}, is the speed of an engine: is there a gear? Write factor = 1 / its ratio"
+            )
         return (
             (unit, 0.9, "", {}) if unit == written else (unit, 0.6, f"; as the way in a turn says, not {written}", {})
         )
@@ -310,15 +314,20 @@ def _hard_over(state: State) -> float:
 def _runs_astern(state: State, name: str) -> bool:
     """Whether a shaft is negative nearly always when the ship goes ahead."""
     ahead, shaft = _way_and_shaft(state, name)
-    fast = ahead > 0.3
-    return bool(fast.any() and np.mean(shaft[fast] < 0) > SETTINGS.astern)
+    return bool(np.sum((shaft < 0) & (ahead > 0.3)) > SETTINGS.astern * np.sum(ahead > 0.3))
 
 
 def _hides_astern(state: State, name: str) -> bool:
-    """Whether a shaft that is never negative turns while the ship goes astern."""
+    """Whether a shaft that is never negative turns while the ship goes astern or is stopped, on a steady course.
+
+    A ship with half the usual way at that shaft speed, or less, gains way; only a turn, or a screw astern, slows it.
+    """
     ahead, shaft = _way_and_shaft(state, name)
-    turning = shaft > 0.2 * float(np.max(shaft, initial=0.0))
-    return bool(state.columns[name].min() >= 0.0 and np.mean(turning & (ahead < -0.1)) > OFTEN_ASTERN)
+    first, last, turned = state.chosen.first, state.chosen.last, np.abs(state.chosen.change(state.psi))
+    before, after = (np.interp(state.t[rows], state.t[(first + last) // 2], ahead) for rows in (first, last))
+    stopped = (before - after > 0.07) & (ahead * np.percentile(shaft, 90) < 0.5 * shaft)
+    astern = (ahead < -0.1) | stopped & (turned < 0.3 * np.percentile(turned, 90))
+    return bool(state.columns[name].min() >= 0.0 and np.mean(astern & (shaft > 0.2 * shaft.max())) > OFTEN_ASTERN)
 
 
 def _way_and_shaft(state: State, name: str) -> tuple[Array, Array]:

@@ -251,26 +251,30 @@ def test_an_order_of_an_actuator_is_asked_though_its_effect_is_not_seen(name: st
     assert any(repr(name) in one.sentence and "n" in one.about for one in state.questions) == taken
 
 
-ALWAYS, HALF = np.where(T % 40 < 20, 90.0, 60.0), T.mean() > T
+ALWAYS, BACK, STOPS = np.where(T % 40 < 20, 90.0, 60.0), np.sign(T.mean() - T), np.clip(1.2 - T % 200 / 60, 0.05, 1)
 
 
 @pytest.mark.parametrize(
-    ("name", "shaft", "astern", "asked"),
+    ("name", "shaft", "way", "asked"),
     [
-        ("rpm", np.abs(RPM), 0.0, False),
-        ("rpm", RPM, 0.0, False),
-        ("rpm", ALWAYS, 0.5, True),
-        ("rpm", ALWAYS, 0.1, True),
-        ("rpm", ALWAYS, 1.0, True),
-        ("rpm", np.where(HALF, ALWAYS, -ALWAYS), 0.5, False),
-        ("rpm", np.where(HALF, ALWAYS, 0.0), 0.5, False),
-        ("bow thruster rpm", ALWAYS, 0.5, False),
+        ("rpm", np.abs(RPM), T**0, False),
+        ("rpm", RPM, T**0, False),
+        ("rpm", ALWAYS, BACK, True),
+        ("rpm", ALWAYS, np.where(0.9 * T[-1] > T, 1.0, -1.0), True),
+        ("rpm", ALWAYS, -(T**0), True),
+        ("rpm", ALWAYS * BACK, BACK, False),
+        ("rpm", ALWAYS * (BACK > 0), BACK, False),
+        ("rpm", ALWAYS, STOPS, True),
+        ("rpm", ALWAYS * STOPS, STOPS, False),
+        ("bow thruster rpm", ALWAYS, BACK, False),
     ],
 )
-def test_a_shaft_that_hides_its_turns_astern_is_asked(name: str, shaft: np.ndarray, astern: float, asked: bool) -> None:
+def test_a_shaft_that_hides_its_turns_astern_is_asked(
+    name: str, shaft: np.ndarray, way: np.ndarray, asked: bool
+) -> None:
     """It was drafted as if it drove the ship ahead, in a log that goes astern for a share of it, without a word."""
     state = state_with_pose({name: shaft})
-    state.r, state.astern, back = R, astern == 1.0, round((1.0 - astern) * (len(T) - 1))
-    state.position = np.where(T[back] >= T, state.position, 2 * state.position[back] - state.position)
+    state.r, state.astern = R, bool(np.all(way < 0))
+    state.position = np.cumsum(2.0 * way * np.exp(1j * LOG["psi"].to_numpy()))
     choose_commands(state)
     assert any("says its sense" in one.sentence for one in state.questions) == asked
