@@ -75,7 +75,6 @@ def perform_manoeuvres(
     check_mapping("environment", environment, "a name to a number or an array")
     weather = _environment_series(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
     check_choice("method", method, get_args(Method))
-
     seas = _check_components({} if components is None else components, len(manoeuvres))
     outputs = as_names("outputs", outputs)
     for name in outputs:
