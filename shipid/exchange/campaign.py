@@ -299,9 +299,11 @@ def study_ship(name: str, seed: int, drawn: int, amounts: Iterable[int], part: P
 
 
 def _try_ship(folder: Path, seed: int, drawn: int, amounts: tuple[int, ...], name: str) -> pd.DataFrame | str:
-    """Cells of a ship, or why it has none."""
+    """Cells of a ship, or why it has none; ResultError where what the folder keeps of it is damaged."""
     try:
         return study_ship(name, seed, drawn, amounts, folder / f"{name}.json")
+    except ResultError:
+        raise
     except ShipidError as error:
         return str(error)
 
