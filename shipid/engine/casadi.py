@@ -14,9 +14,9 @@ from shipid.interrupts import hold_interrupts
 from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
-BLOCK = (
-    256  # steps of one call in `memory_along`, samples of one in `_evaluate_samples`: made once, whatever is asked for
-)
+# steps of one call in `memory_along`, samples of one in `_evaluate_samples`: made once, whatever is asked for; steps
+# of the former that are one expression
+BLOCK, UNROLLED = 256, 16
 
 
 def input_symbols(model: Dynamics) -> list[ca.SX]:
@@ -116,16 +116,18 @@ def run_casadi(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[A
 
 @lru_cache(maxsize=32)
 def _memory_scan(model: Dynamics) -> tuple[ca.Function, tuple[int, ...]]:
-    """(memory, commands, dt, parameters) -> memory after each of `BLOCK` steps, and which parameters it takes.
+    """(memory, its orders, dt, parameters) -> memory after each of `BLOCK` steps, and which parameters it takes.
 
-    All parameters at every step would cost more than the steps.
+    All commands and parameters at every step would cost more than the steps, as would a call of each step.
     """
     memory, order = ca.SX.sym("memory", len(model.memory)), ca.SX.sym("order", len(model.commands))
     dt, parameters = ca.SX.sym("dt"), ca.SX.sym("parameters", len(model.parameters))
     still = ca.SX(len(model.state) + len(model.hidden), 1), ca.SX(len(model.environment), 1)
     after = model.advance(still[0], memory, order, still[1], parameters, dt)
     used = tuple(np.flatnonzero(ca.which_depends(after, parameters, 1, False)).tolist())
-    return ca.Function("advance", [memory, order, dt, parameters[list(used)]], [after]).mapaccum(BLOCK), used
+    of_memory = [model.commands.index(name) for name in model.memory]
+    steps = ca.Function("advance", [memory, order[of_memory], dt, parameters[list(used)]], [after]).mapaccum(UNROLLED)
+    return steps.expand().mapaccum(BLOCK // UNROLLED), used
 
 
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
@@ -136,22 +138,15 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     model = vessel_dynamics(vessel)
     if not model.memory:
         return None
-    orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.commands])
-    first = orders[[model.commands.index(name) for name in model.memory], 0]
-    count = len(t) - 1
-    if count == 0:
-        return dict(zip(model.memory, first[:, None], strict=True))
-    (scan, used), parts = _memory_scan(model), list[Array]()
-    values = np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK))
+    orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.memory])
+    (scan, used), parts = _memory_scan(model), [orders[:, :1]]
+    values = ca.DM(np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK)))
+    dt, count = np.diff(t), len(t) - 1
     held = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1)  # the last block is padded
-    reached, dt = first, np.diff(t)
     with hold_interrupts():
         for rows in held.reshape(-1, BLOCK):
-            parts.append(np.array(scan(reached, orders[:, rows], dt[None, rows], values)))
-            reached = parts[-1][:, -1]
-    after = np.concatenate(parts, axis=1)[:, :count]
-    states = np.concatenate([first[:, None], after], axis=1)
-    return dict(zip(model.memory, states, strict=True))
+            parts.append(np.array(scan(parts[-1][:, -1], orders[:, rows], dt[None, rows], values)))
+    return dict(zip(model.memory, np.concatenate(parts, axis=1)[:, : len(t)], strict=True))
 
 
 @lru_cache(maxsize=64)

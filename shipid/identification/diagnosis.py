@@ -450,17 +450,17 @@ class _VesselLog(_Log):
         return [*list_causes(self.vessel, self.commands, self.motion, self.scales), *_unsigned_shafts(self)]
 
     def memory(self, motion: Motion) -> Array:
-        """Actuator states (M, N) that the orders of a log reach."""
-        orders = {name: motion.columns[name] for name in self.commands}
-        if self._kept is not None and all(values is self.motion.columns[name] for name, values in orders.items()):
+        """Actuator states (M, N) that the orders of a log reach: other changes of the log leave those that are kept."""
+        names, columns = self.model.memory, motion.columns
+        if self._kept is not None and all(columns[name] is self.motion.columns[name] for name in names):
             return self._kept[0]
         reached = [
-            memory_along(self.vessel, {name: x[part] for name, x in orders.items()}, motion.step * np.arange(count))
+            memory_along(self.vessel, {name: columns[name][part] for name in names}, motion.step * np.arange(count))
             or {}
             for part, count in ((part, part.stop - part.start) for part in motion.stretches)
         ]
-        series = [np.concatenate([one[name] for one in reached]) for name in self.model.memory]
-        return np.reshape(series, (len(series), len(motion.columns["u"])))
+        series = [np.concatenate([one[name] for one in reached]) for name in names]
+        return np.reshape(series, (len(series), len(columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""

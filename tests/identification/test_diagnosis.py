@@ -11,9 +11,16 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.diagnosis import NONE, UNCLEAR, diagnose
+from shipid.identification.diagnosis import NONE, UNCLEAR, _VesselLog, diagnose
 from shipid.vessel.load import load_vessel
-from tests.identification.faulty_logs import diagnose_log, draw_faulty_log, draw_ship, judge_causes
+from tests.identification.faulty_logs import (
+    dataset_frame,
+    diagnose_log,
+    draw_faulty_log,
+    draw_ship,
+    judge_causes,
+    vessel_document,
+)
 from tests.identification.trials import changed, noisy, trials
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -104,6 +111,20 @@ def test_a_fault_is_named_whose_paths_hardly_show_it(seed: int, number: int, cau
     log = draw_faulty_log(seed, number, draw_ship(number % 20, seed), 1)
     assert log.causes == (cause,)
     assert judge_causes(log, *diagnose_log(log, tmp_path)) == "right"
+
+
+@pytest.mark.slow
+def test_what_is_kept_of_a_log_changes_no_digit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A screw and the rudder have a lag; states of actuators and forces are computed for each cause."""
+    drawn, lag = draw_faulty_log(62, 1, draw_ship(1, 62), 2), 'kind = "first_order"\nT = 1.5\n'
+    (tmp_path / "lagged.toml").write_text(
+        vessel_document(drawn)
+        + "".join(f"[thruster.{name}]\n{lag}" for name in ("port.actuator.n", "rudder.actuator.delta"))
+    )
+    vessel, log = load_vessel(str(tmp_path / "lagged.toml")), Dataset(dataset_frame(drawn), {})
+    kept = diagnose(vessel, log)
+    monkeypatch.setattr(_VesselLog, "_kept", property(lambda _: None, lambda _, _kept: None))
+    assert repr(diagnose(vessel, log)) == repr(kept)
 
 
 @pytest.mark.parametrize("key", ["sensor psi bias", "sensor r bias", "lever arm position"])
