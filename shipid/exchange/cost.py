@@ -162,8 +162,10 @@ class Ways:
         if self.reach[f, k] >= PROBABLE and self.price[f, k] == 0:
             return [*lines, "Stop here: nothing has to be bought."]
         step, *rest = self.steps
-        text = f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} "
-        text += "in all" if goal else "with what the error costs"
+        text = (
+            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} "
+            f"{'in all' if goal else 'with what the error costs'}"
+        )
         instead = [f"{money(self.steps[one])} if you {self.step_text(one)}" for one in rest]
         text += f"; instead, {', '.join(instead)}" if instead else ""
         least = metres_text(cost.run / (cost.per_metre or 1))
