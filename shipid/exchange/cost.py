@@ -195,7 +195,7 @@ class Ways:
         low, middle, high = np.quantile(self.error[:, f, k], [0.025, 0.5, 0.975])
         text = f"{model_text(self.foundations[f])} with {counted_text(int(self.amounts[k]), 'run')} for "
         text = f"{CONSTANT_MOTION} for " if self.foundations[f] == NO_MODEL and self.amounts[k] == 0 else text
-        text += f"{price_text(self.price[f, k], self.cost.unit)}: an error of {difference_text(middle, low, high)}"
+        text += f"{price_text(self.price[f, k], self.cost.unit)}: {difference_text(middle, low, high)}"
         if self.cost.per_metre is None:
             return f"{text}, a chance of {percent_text(self.reach[f, k])}"
         return f"{text}, {price_text(self.expected[f, k], self.cost.unit)} with what the error costs"
