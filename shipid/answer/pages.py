@@ -46,10 +46,12 @@ REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
 def report_content(results: Results) -> ReportContent:
     """Assemble everything that the report of a study shows."""
     plan, tables = results.plan, {name: frame(results) for name, frame in REPORT_FRAMES.items()}
+    said = sentences.answer_sentences(results, sentences_on_methods(tables["methods"]))
     words = (
-        *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
-        *bands.answer_on_bands(results, tables["coverage"]),
+        *said[:1],
         *((text, "frontier") for text in cost.cost_sentences(results)),
+        *said[1:],
+        *bands.answer_on_bands(results, tables["coverage"]),
     )
     best, models = sentences.best_model(results), results.models
     if (NO_MODEL, verdict_method(plan)) not in {(name, way.name) for name, way in plan.pairs}:

@@ -92,7 +92,10 @@ def _move_to_front(words: list[str]) -> list[str]:
 
 def print_usage_error(error: Any, _: Any = None) -> None:
     """Print a wrong argument in one line, as `main` prints other errors; that of Typer is four."""
-    fault, command = " ".join(error.format_message().split()), error.ctx.command_path if error.ctx else "shipid"
+    fault, command = (
+        " ".join(error.format_message().replace("Value error, ", "").split()),
+        error.ctx.command_path if error.ctx else "shipid",
+    )
     sys.stderr.write(f"error: {fault.rstrip('.')}: `{command} --help` shows what is right\n")
 
 

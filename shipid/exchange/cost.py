@@ -156,25 +156,25 @@ class Ways:
         aim = "The cheapest way in all" if goal is None else f"The cheapest way to {metres_text(goal)} at the horizon"
         lines = [f"{aim}, of those tried, is {way}."]
         others = [self.way_text(*self.best(g)) for g in range(len(self.prices)) if g != f]
-        others = [f"The best with other physics: {'; '.join(others)}."] if others else []
         if self.reach[f, k] < PROBABLE:
             lines = [f"No way that was tried is likely to reach {metres_text(self.goal)}; the surest is {way}."]
-        elif goal is not None and self.price[f, k] == 0:
-            return [*lines, *others, "Stop here: nothing has to be bought."]
+        lines += [f"The best with other physics: {'; '.join(others)}."] if others else []
+        if self.reach[f, k] >= PROBABLE and self.price[f, k] == 0:
+            return [*lines, "Stop here: nothing has to be bought."]
         step, *rest = self.steps
-        whole = "in all" if goal else "with what the error costs"
         text = (
-            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} {whole}"
+            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} "
+            f"{'in all' if goal else 'with what the error costs'}"
         )
         instead = [f"{money(self.steps[one])} if you {self.step_text(one)}" for one in rest]
         text += f"; instead, {', '.join(instead)}" if instead else ""
         least = metres_text(cost.run / (cost.per_metre or 1))
-        end = f"Stop when a further run lowers the error by less than {least}: a run costs as much."
         return [
             *lines,
-            *others,
             f"{text}.",
-            end if goal is None else f"Stop as soon as runs show {metres_text(goal)} or less.",
+            f"Stop when a further run lowers the error by less than {least}: a run costs as much."
+            if goal is None
+            else f"Stop as soon as runs show {metres_text(goal)} or less.",
         ]
 
     def step_text(self, step: str | int) -> str:
@@ -182,8 +182,9 @@ class Ways:
         if step == "stop":
             return f"stop (error {metres_text(np.median(self.least()[:, 0]))})"
         if isinstance(step, str):
+            text = counted_text(int(self.amounts[1]), "run")
+            text = f"go on from {int(self.amounts[0])} to {text}" if self.amounts[0] else f"make {text}"
             price, error = self.runs[1], self.least()[:, 1]
-            text = f"go on from {int(self.amounts[0])} to {counted_text(int(self.amounts[1]), 'run')}"
         else:
             price, error = self.prices[step], self.error[:, step, 0]
             text = f"buy {model_text(self.foundations[step])}"

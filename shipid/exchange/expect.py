@@ -102,8 +102,8 @@ def likely_physics(kinds: Sequence[str] | None, error: float | None) -> list[Phy
     """Physics of some kinds, `OFFERED` where neither is known, or of an error A [m], of a kind or of any."""
     if error is None:
         return list(kinds or OFFERED)
-    if len(kinds or []) > 1:
-        raise ShipidError("A is that of one kind: give one --kind, or none", path="--A")
+    if len(kinds or []) > 1 or kinds == [NO_MODEL]:
+        raise ShipidError("is that of one physics: give one --kind at most, and not 'none'", path="--A")
     return [(kinds[0], error) if kinds else error]
 
 

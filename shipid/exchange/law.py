@@ -561,5 +561,5 @@ def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
             parts[name] = Hierarchy(response, theta, covariance, variances, part["ships"])
         limits = {name: (float(low), float(high)) for name in LIMITED for low, high in [content["limits"][name]]}
         return ExchangeLaw(parts, limits, content["provenance"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise ResultError(f"is no law of exchange ({error!r})", file=file) from None
+    except (KeyError, TypeError, ValueError):
+        raise ResultError("is no law of exchange: give a law.json that shipid has written", file=file) from None

@@ -67,7 +67,8 @@ class Cause:
         for each entry of the size; empty for a cause without a size. unit : of the size.
     least : a smaller size is what any log has. ratio : whether the size is the logarithm of a factor.
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
-    repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse.
+    repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse, {degrees0} for the
+        negative in degrees.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
     cost : added to the misfit: for free signs, or for one column alone of an instrument that gives two.
     of_runs : whether each run has a size of its own.
@@ -104,8 +105,11 @@ class Cause:
     def repair_text(self, theta: Array) -> str:
         """The repair with the size in it."""
         sizes = self.sizes(theta)
-        words = {f"minus{i}": f"{-size:.4g}" for i, size in enumerate(sizes)}
-        words |= {f"over{i}": f"{1 / (size or np.inf):.4g}" for i, size in enumerate(sizes)}
+        words = {
+            f"{name}{i}": f"{value:.4g}"
+            for i, size in enumerate(sizes)
+            for name, value in (("minus", -size), ("degrees", -np.degrees(size)), ("over", 1 / (size or np.inf)))
+        }
         return self.repair.format(*(f"{size:.4g}" for size in sizes), **words)
 
 
@@ -207,13 +211,22 @@ def _scale_numbers(where: NDArray[np.bool_], motion: Motion, size: Array) -> Mot
     return replace(motion, parameters=np.where(where, motion.parameters * np.exp(size[0]), motion.parameters))
 
 
+def _offset_repair(column: str, unit: str) -> str:
+    """Lines of a mapping, whose offset is in the unit of its column: in SI, with degrees of an angle beside it."""
+    return (
+        f"[columns.{column}]\noffset = {{minus0}}  # {unit}"
+        + f" or {{degrees0}} {unit.replace('rad', 'deg')}" * ("rad" in unit)
+        + ": as is its unit; added to what is there"
+    )
+
+
 def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]:
     size, angle, key = float(np.sqrt(np.mean(values**2))), is_steering(name), f"command {name}"
     column, unit = f'[columns."{name}"]\n', "rad" if angle else "rev/s" if is_shaft(name) else ""
     strength = ("coefficient rudder",) if angle else (f"{key} zero", "coefficient thrust", "coefficient damping")
     yield Cause(
         f"{key} zero", partial(_subtract, name), (0.05 * size,), unit, 0.003 if angle else 0.01 * size,
-        repair=f"{column}offset = {{minus0}}  # {unit}, added to what is there",
+        repair=_offset_repair(f'"{name}"', unit),
         equals=("asymmetry of hull or screw",) if angle else (f"{key} scale", *strength[1:]),
         tells="the angle read on a slip, and a run at another speed" if angle else SPEEDS,
     )  # fmt: skip
@@ -261,7 +274,7 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
     for name, equals in bias.items():
         yield Cause(
             f"sensor {name} bias", partial(_subtract, name), (0.02 * size[name],), unit[name], 0.003 * size[name],
-            repair=f"[columns.{name}]\noffset = {{minus0}}  # {unit[name]}, added to what is there",
+            repair=_offset_repair(name, unit[name]),
             equals=equals, tells=f"{COURSES} and at several speeds",
         )  # fmt: skip
     yield Cause(
@@ -344,8 +357,9 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
             "wind scale", partial(_divide, ["V_w"]), (0.05,), "1", 0.05, ratio=True, equals=("coefficient wind",),
             repair="[columns.V_w]\nfactor = {over0}  # times what is there", tells="the wind read at rest",
         )  # fmt: skip
-        words = "[columns.beta_w]\noffset = {minus0}  # rad, added to what is there"
-        yield Cause("wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05, repair=words)
+        yield Cause(
+            "wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05, repair=_offset_repair("beta_w", "rad")
+        )
 
 
 def _coefficient_causes(vessel: Vessel) -> Iterator[Cause]:

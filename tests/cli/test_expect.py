@@ -48,7 +48,7 @@ def test_a_study_is_foretold_at_more_runs(tiny_run: Path):
             "kind: 'guess' is no kind: give one of model-test, identified, nominal",
         ),
         ("--vessel otter --sea calm", "--sea: goes with --length and --speed"),
-        ("--length 120 --speed 7 --A 4 --kind template --kind none", "--A: A is that of one kind"),
+        ("--length 120 --speed 7 --A 4 --kind template --kind none", "--A: is that of one physics"),
         ("--length 120 --speed 7 --law no.json", "no.json: cannot be read"),
         ("--vessel no-ship", "no-ship"),
         ("--vessel otter --length 3", "--length: --vessel has its own: leave one of the two out"),

@@ -106,5 +106,5 @@ def test_what_is_asked_is_one_error_or_some_kinds():
     assert expect.likely_physics(None, None) == list(expect.OFFERED)
     assert expect.likely_physics(["template"], 4.0) == [("template", 4.0)]
     assert expect.likely_physics(None, 4.0) == [4.0]
-    with pytest.raises(ShipidError, match="--A: A is that of one kind"):
+    with pytest.raises(ShipidError, match="--A: is that of one physics"):
         expect.likely_physics(["template", "sister"], 4.0)

@@ -49,7 +49,8 @@ def test_a_trial_step_is_felt_and_a_repair_holds_its_numbers(ship: str) -> None:
         after = cause.change(motion, np.array(cause.trial))
         moved = [name for name, values in motion.columns.items() if not np.array_equal(after.columns[name], values)]
         assert moved or after.course or not np.array_equal(after.parameters, motion.parameters), cause.key
-        assert "{" not in cause.repair_text(np.array(cause.trial)), cause.key
+        assert "{" not in (text := cause.repair_text(np.array(cause.trial))), cause.key
+        assert "# rad" not in text or f"{-np.degrees(cause.trial[0]):.4g} deg" in text, cause.key
 
 
 def test_a_delay_is_undone_within_each_stretch() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.exchange.cost import Ways
-from shipid.report import ReportContent, cost
+from shipid.report import AnswerSentence, ReportContent, cost
 from shipid.report.page import draw_sections
 from shipid.report.sections import SECTIONS
 from shipid.study.schema import Cost
@@ -23,7 +23,11 @@ def priced(content: ReportContent, **goal: float) -> ReportContent:
     block = Cost(unit="h", run=10.0, mobilisation=20.0, **goal)
     prices, amounts = np.array([0.0, 5.0, 35.0]), np.array([0.0, 2, 4, 8])
     ways = Ways(block, ("none", "template", NASTY), amounts, error * np.array([[[0.9]], [[1.0]], [[1.1]]]), prices)
-    return replace(content, frames={**content.frames, "cost": ways.table()})
+    return replace(
+        content,
+        answer=[AnswerSentence("Buy.", "frontier"), AnswerSentence("Stop.", "frontier")],
+        frames={**content.frames, "cost": ways.table()},
+    )
 
 
 @pytest.mark.parametrize("goal", [{"per_metre": 30.0}, {"H_end_required": 2.5}], ids=str)
@@ -39,7 +43,7 @@ def test_each_way_is_a_point_at_its_price_and_those_of_the_frontier_have_a_ring(
     assert np.array(template.marker.line.width).tolist() == [2, 0, 0, 0]
     assert np.array(sister.marker.line.width).tolist() == [2, 2, 2, 2]
     assert len(rest) == ("H_end_required" in goal)
-    assert figure.takeaway == "From 12.0 m for 0 h to 1.00 m for 135 h."
+    assert figure.takeaway == "Buy. From 12.0 m for 0 h to 1.00 m for 135 h."
     assert [chip.label for chip in figure.chips] == ["no physics", "template", NASTY]
     assert "<b>" not in f"{sister.name} {sister.customdata}"
 
