@@ -24,6 +24,7 @@ POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
+OFFSET = 0.02  # rad: less is no finding
 SIGNALS_LATE = {
     "position": ("position", "velocity"),
     "velocity": ("velocity", "position"),
@@ -32,6 +33,8 @@ SIGNALS_LATE = {
 }
 """Signal of a diagnosis -> its name, and that of the signal that is late where it is early."""
 TURNED = np.radians(0.5)  # of a track against velocities, at least
+CLEAR = 0.008  # rad: standard error of a heading that is off, at most
+ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
 NO_PLACE, FAR_STEPS = 0.01, 20.0  # deg, and usual steps, by which rows about it are away from it, at least
 LOST = 0.5  # share of the rows without a fix, at most
@@ -78,8 +81,9 @@ def defects_of_motion(state: State) -> None:
     course = _ask_if_course(state)
     if state.velocity is None or state.body is None:
         _report_position_jumps(state, _own_path(state))
-        return
-    _report_position_jumps(state, _report_causes(state, () if course else ("psi", "r")))
+    else:
+        _report_position_jumps(state, _report_causes(state, () if course else ("psi", "r")))
+    _report_heading_offset(state)
 
 
 def _report_causes(state: State, turning: tuple[str, ...]) -> Complex:
@@ -203,6 +207,13 @@ def _value_step(values: Array) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
+def _jackknife_error(design: Array, values: Array, rows: NDArray[np.intp]) -> float:
+    """Standard error of the first coefficient of a fit to some rows: the scatter without each of ten parts of them."""
+    others = [np.setdiff1d(rows, part) for part in np.array_split(rows, 10)]
+    without = [np.linalg.lstsq(design[kept], values[kept], rcond=None)[0][0] for kept in others]
+    return float(np.std(without) * np.sqrt(len(without) - 1))
+
+
 def _own_path(state: State) -> Complex:
     """Path (N,) [m] by the medians of the steps of the position about each row, where no velocities are logged."""
     steps = pd.Series(np.diff(state.t))
@@ -228,6 +239,42 @@ def _report_position_jumps(state: State, path: Complex) -> None:
     if stay:
         words = "the position jumps and does not come back"
         report_breaks(state, "position jumps", (), words, stay, "m")
+
+
+def _report_heading_offset(state: State) -> None:
+    angle, error, current = _off_on_all_courses(state)
+    if error < CLEAR and np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # of more it is a drift, or another zero
+        why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
+        why += f", beside a steady current of {abs(current):.2g} m/s: heading off, positions in turned axes, or wind"
+        repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
+        state.find("heading offset", ("psi",), 0.6, why, repair)
+
+
+def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
+    """How far the heading is off [rad], its standard error, and a steady current, north + i east [m/s].
+
+    Over each window: way across the heading = tan(off) * (way along it) + arm * (turn) + (current across).
+    """
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    psi = state.chosen.change(evidence.integrate_rate(state.t, state.psi)).real / span
+    north = np.exp(-1j * psi)
+    if state.body is None:
+        ran = state.chosen.change(state.position) / span * north
+    else:
+        ran = state.chosen.change(evidence.integrate_rate(state.t, state.body)) / span
+    ran = -ran if state.astern else ran
+    columns = (ran.real, state.chosen.change(state.psi).real / span, north.imag, north.real)
+    design = np.stack(columns, axis=1)
+    keep = np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90)
+    for _ in range(2):
+        if keep.sum() < 40 or abs(complex(np.mean(north[keep]))) > ONE_WAY:  # across one course a current is no less
+            return 0.0, np.inf, 0j
+        found = np.linalg.lstsq(design[keep], ran.imag[keep], rcond=None)[0]
+        miss = np.abs(ran.imag - design @ found)
+        keep &= miss <= 6.0 * np.median(miss[keep]) + 1e-9
+    error = _jackknife_error(design, ran.imag, np.flatnonzero(keep))
+    off = float(np.arctan(found[0]))
+    return off, error, complex(found[2], found[3]) * np.cos(off) * np.exp(1j * off)
 
 
 def report_breaks(
