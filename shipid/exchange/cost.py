@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import combinations, product
 from operator import itemgetter
 
@@ -151,7 +151,6 @@ class Ways:
     def sentences(self) -> list[str]:
         """What to buy, what further runs and other physics would change, what to do next, and when to stop."""
         cost, (f, k) = self.cost, self.best()
-        money = partial(price_text, unit=cost.unit)
         goal, way = cost.H_end_required, self.way_text(f, k)
         aim = "The cheapest way in all" if goal is None else f"The cheapest way to {metres_text(goal)} at the horizon"
         lines = [f"{aim}, of those tried, is {way}."]
@@ -162,11 +161,12 @@ class Ways:
         if self.reach[f, k] >= PROBABLE and self.price[f, k] == 0:
             return [*lines, "Stop here: nothing has to be bought."]
         step, *rest = self.steps
+        money = {one: "about " + price_text(float(f"{loss:.2g}"), cost.unit) for one, loss in self.steps.items()}
         text = (
-            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money(self.steps[step])} "
+            f"Next: {self.step_text(step)}. If all later steps are the best, expect {money[step]} "
             f"{'in all' if goal else 'with what the error costs'}"
         )
-        instead = [f"{money(self.steps[one])} if you {self.step_text(one)}" for one in rest]
+        instead = [f"{money[one]} if you {self.step_text(one)}" for one in rest]
         text += f"; instead, {', '.join(instead)}" if instead else ""
         least = metres_text(cost.run / (cost.per_metre or 1))
         return [
