@@ -28,9 +28,9 @@ def expect_command(
         float | None,
         typer.Option("--A", min=1e-6, max=1e6, help="m, mean error of the physics alone, of one --kind or any"),
     ] = None,
-    runs: Annotated[list[int] | None, typer.Option(min=0, help="that train; may be repeated")] = None,
+    runs: Annotated[list[int] | None, typer.Option(min=0, max=100_000, help="that train; may be repeated")] = None,
     ahead: Annotated[
-        float | None, typer.Option(min=0.01, max=1e6, help="ship lengths at 0.75 of the service speed; default: 2")
+        float | None, typer.Option(min=0.01, max=1000, help="ship lengths at 0.75 of the service speed; default: 2")
     ] = None,
     sea: Annotated[
         Literal["calm", "ordinary", "rough"] | None, typer.Option(help="of a third of the ships; default: of all")
