@@ -31,6 +31,7 @@ from shipid.study.run import run_unit
 from shipid.study.store import check_shard
 from shipid.study.workers import on_workers
 from shipid.units import GRAVITY
+from shipid.users import code_digest
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
 from shipid.vessel.similar import similar_vessels, vessel_particulars
@@ -322,10 +323,10 @@ def run_ships(
     Each ship has its files, one of them while it is at work, so that shards may share the folder; after each,
     `cells.csv` is anew.
 
-    Raises ResultError for a folder of another study.
+    Raises ResultError for a folder of another study, or of other code, whose ships would be mixed with these.
     """
     first, every = check_shard(shard)
-    settings = {"seed": seed, "drawn": drawn, "amounts": list(amounts)}
+    settings = {"seed": seed, "drawn": drawn, "amounts": list(amounts), "code": code_digest()}
     place = folder / "ships.json"
     if place.exists() and (known := read_json(place)) != settings:
         raise ResultError(f"holds the study over ships with {known}, not {settings}: take another folder", file=place)

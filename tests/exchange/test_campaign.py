@@ -19,6 +19,7 @@ from shipid.exchange.campaign import (
     studied_ship,
     study_ship,
 )
+from shipid.files import read_json
 
 DRAWN, SEED, AMOUNTS = 10, 612, (1, 2)
 KEY = ["ship", "foundation", "N_D", "ahead"]
@@ -116,3 +117,27 @@ def test_a_ship_that_fails_is_a_line_and_is_left_out(tmp_path: Path, monkeypatch
         next(run_ships(tmp_path, SEED + 1, DRAWN))
     with pytest.raises(ResultError, match="i from 1 to n"):
         next(run_ships(tmp_path, SEED, DRAWN, shard=(3, 2)))
+
+
+def test_ships_of_other_code_are_not_mixed_and_a_damaged_file_of_a_ship_is_no_ship_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ship that is left out is missing in the law, without an error."""
+
+    def study(name: str, *given: Any) -> pd.DataFrame:
+        if given[-1].exists():
+            read_json(given[-1])
+        return pd.DataFrame({"ship": [name], "H": [1.0]})
+
+    monkeypatch.setattr(campaign, "study_ship", study)
+    monkeypatch.setattr(campaign, "ship_names", lambda _=0: ["drawn-01", "otter"])
+    first = run_ships(tmp_path, SEED, DRAWN)
+    next(first)
+    first.close()
+    (tmp_path / "otter.json").write_text('{"drawn')
+    with pytest.raises(ResultError, match=r"otter\.json"):
+        list(run_ships(tmp_path, SEED, DRAWN))
+    (tmp_path / "otter.json").unlink()
+    monkeypatch.setattr(campaign, "code_digest", lambda: "00000000")
+    with pytest.raises(ResultError, match="take another folder"):
+        list(run_ships(tmp_path, SEED, DRAWN))
