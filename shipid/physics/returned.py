@@ -37,7 +37,7 @@ def _as_symbols(value: Any) -> SX | None:
         return value
     try:
         return ca.SX(value)
-    except RuntimeError:  # rows of unequal length; NotImplementedError, which is one: what CasADi takes for no matrix
+    except RuntimeError:  # of CasADi: rows of unequal length, or, as NotImplementedError, a value that is no matrix
         return None
 
 

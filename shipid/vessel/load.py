@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-LONGEST_CHAIN = 20  # documents that extend or patch one another
+LONGEST_CHAIN = 20  # documents or families that extend or patch one another
 FOUR_QUADRANT = "thruster.four_quadrant"
 MOST_BLOCK = 2.0  # m / (rho L_pp B T), as `LEAST_BLOCK`: far beyond any ship and its degraded models
 

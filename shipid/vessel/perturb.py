@@ -34,7 +34,7 @@ from shipid.arguments import check_class, check_whole_number
 from shipid.checked import CheckedModel
 from shipid.errors import DocumentError, suggest_name
 from shipid.physics.grammar import hull_derivative, service_deviation
-from shipid.vessel.load import Vessel
+from shipid.vessel.load import LONGEST_CHAIN, Vessel
 from shipid.vessel.ranges import UNUSUAL
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
@@ -323,6 +323,9 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         where = f"family.{places[family.name]}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
+        if len(above) >= LONGEST_CHAIN:
+            fault = f"a chain of more than {LONGEST_CHAIN} families: write the rules out"
+            raise DocumentError(fault, file=file, path=f"{where}.extends")
         parent = Family(name="empty")
         if family.extends is not None:
             if family.extends not in places:

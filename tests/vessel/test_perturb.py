@@ -197,6 +197,11 @@ def test_extends_puts_the_other_rules_first(base: Vessel) -> None:
         ([{"name": "a", "extends": "a"}], "extends itself", "family.0.extends"),
         ([{"name": "a", "base": "x"}, {"name": "b", "extends": "aa"}], "did you mean 'a'", "family.1.extends"),
         ([{"name": "a"}], "name a base vessel", "family.0.base"),
+        (
+            [{"name": f"a{k}", "extends": f"a{k + 1}"} for k in range(2000)],
+            "more than 20 families",
+            "family.20.extends",
+        ),
         ([{"name": "a", "base": "x"}, {"name": "a", "base": "y"}], "two families are called 'a'", "family.1.name"),
     ],
 )
