@@ -57,7 +57,8 @@ class Journal:
         if cell not in self._studies:
             return []
         study = self._studies[cell]
-        if self.digest and study.user_attrs.get(DIGEST) != self.digest:
+        unsaid = "" if study.trials else self.digest  # of a study that a process began, and was stopped before its digest
+        if self.digest and study.user_attrs.get(DIGEST, unsaid) != self.digest:
             raise ResultError(f"the trials of {cell} are of another study; {REMEDY}", file=self.file)
         rows: list[Row] = []
         for trial in study.trials:
@@ -90,6 +91,7 @@ class Journal:
                 self._studies[cell] = optuna.create_study(study_name=cell, storage=self.storage)
             except AssertionError:  # of Optuna, which does not find the study that it has just written
                 raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=self.file) from None
+        if DIGEST not in self._studies[cell].user_attrs:
             self._studies[cell].set_user_attr(DIGEST, self.digest)
         return self._studies[cell]
 
