@@ -79,11 +79,8 @@ class TrialJournal(Protocol):
     def count(self, cell: str) -> int | None:
         """Return how many trials the budget of a search allowed; None before that is decided."""
 
-    def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
-        """Append trials to searches: cell -> rows, each with the next number."""
-
-    def decide(self, cells: Sequence[str], count: int) -> None:
-        """Write how many trials some searches have."""
+    def add(self, entries: Mapping[str, Sequence[Row | int]]) -> None:
+        """Append to searches: cell -> trials, each with the next number, or how many there will be."""
 
 
 @dataclass(frozen=True, eq=False)

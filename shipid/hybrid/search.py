@@ -206,7 +206,7 @@ class Search:
             self.rows[name].append(row)
         new = {self.cells[name]: [row] for name, row in rows.items() if len(self.rows[name]) > self.known[name]}
         if self.journal is not None and new:
-            self.journal.add(new, self.method.space())
+            self.journal.add(new)
 
     def _decide(self, done: int) -> None:
         """Turn the budget into a number of trials, as soon as enough are timed, and write it down."""
@@ -215,7 +215,7 @@ class Search:
         before = time.process_time() - self.begun if self.before is None else self.before
         self.count = affordable_trials(self.method.budget * len(self.rows), before, seconds, self.closing)
         if self.count is not None and self.journal is not None:
-            self.journal.decide(list(self.cells.values()), self.count)
+            self.journal.add({cell: [self.count] for cell in self.cells.values()})
 
 
 def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
@@ -240,7 +240,7 @@ def suggested_points(
     """
     import optuna  # a study is read without it
 
-    from shipid.hybrid.journal import TRIAL_STATES
+    from shipid.hybrid.trials import TRIAL_STATES
 
     space, studies = method.space(), {key: optuna.create_study() for key in search.rows}
     older: dict[str, Any] = (

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from shipid.hybrid.journal import read_entries
 from shipid.study import seals, store
 from shipid.study.lock import has_writer
 from shipid.study.plan import WITH, Plan
 from shipid.study.seals import Fault
 from shipid.units import plural_word
-
-BEGUN, COUNTED, TRIED = 0, 2, 4  # entries of Optuna's journal: a study, an attribute of it, a trial that ended
 
 
 @dataclass(frozen=True)
@@ -78,15 +76,9 @@ def search_words(plan: Plan, folder: Path) -> str:
 
 
 def _words_of_journal(plan: Plan, file: Path) -> str:
-    *whole, _ = file.read_bytes().split(b"\n")  # the last line may be half written
-    entries = [json.loads(line) for line in whole]
-    tried = [entry["study_id"] for entry in entries if entry["op_code"] == TRIED]
-    cell = [entry["study_name"] for entry in entries if entry["op_code"] == BEGUN][tried[-1]]
-    planned = [way.method.num_trials() for way in plan.methods if f"{WITH}{way.name}-N" in cell]
-    noted = [
-        entry["user_attr"]["trials"]  # of a budget
-        for entry in entries
-        if entry["op_code"] == COUNTED and entry["study_id"] == tried[-1] and "trials" in entry["user_attr"]
-    ]
+    entries = read_entries(file.read_bytes())
+    tried = [name for _, name, entry in entries if isinstance(entry, dict)]
+    planned = [way.method.num_trials() for way in plan.methods if f"{WITH}{way.name}-N" in tried[-1]]
+    noted = [entry for _, name, entry in entries if name == tried[-1] and isinstance(entry, int)]  # of a budget
     counts = [f"/{count}" for count in (*planned, *noted) if count]
-    return f"{cell}: trial {tried.count(tried[-1])}{''.join(counts[-1:])}"
+    return f"{tried[-1]}: trial {tried.count(tried[-1])}{''.join(counts[-1:])}"

@@ -10,7 +10,6 @@ import pickle
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -18,7 +17,7 @@ from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Row, Space
+from shipid.hybrid.method import Row
 from shipid.plugins import TRIED_FILES, import_files
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
@@ -38,63 +37,44 @@ Result = TypeVar("Result")
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Line:
-    """Sends messages of a task from a worker to the process that gave it, by a topic of the scheduler."""
-
-    topic: str
-
-    def send(self, *message: Any) -> None:
-        """Send a message."""
-        from dask.distributed import get_worker
-
-        get_worker().log_event(self.topic, pickle.dumps(message))
-
-    def sent(self) -> list[tuple[Any, ...]]:
-        """Messages of this task so far: of a worker that has died meanwhile."""
-        from dask.distributed import get_client
-
-        return [pickle.loads(content) for _, content in get_client().get_events(self.topic)]
-
-
 class SentJournal(Journal):
     """The journal of a unit on a worker of a cluster, in a file there; all that is added to it is sent, too.
 
     content : of the journal in the folder of the run; what a worker that died has sent since is added.
+    topic : of the scheduler, by which the process that gave the unit receives what is added.
     """
 
-    def __init__(self, file: Path, content: bytes, digest: str, line: Line) -> None:
+    def __init__(self, file: Path, content: bytes, digest: str, topic: str) -> None:
+        from dask.distributed import get_client
+
         file.write_bytes(content)
         super().__init__(file, study=digest)
-        for name, *given in line.sent():
-            getattr(super(), name)(*given)
-        self._line = line
+        for _, message in get_client().get_events(topic):
+            super().add(pickle.loads(message))
+        self.topic = topic
 
-    def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
-        """Append trials to searches, and send them."""
-        super().add(rows, space)
-        self._line.send("add", rows, space)
+    def add(self, entries: Mapping[str, Sequence[Row | int]]) -> None:
+        """Append to searches, and send it."""
+        from dask.distributed import get_worker
 
-    def decide(self, cells: Sequence[str], count: int) -> None:
-        """Write how many trials some searches have, and send it."""
-        super().decide(cells, count)
-        self._line.send("decide", cells, count)
+        super().add(entries)
+        get_worker().log_event(self.topic, pickle.dumps(entries))
 
 
 def on_dask(
     scheduler: str,
-    work: Callable[[Shared, Task, Line], Result],
+    work: Callable[[Shared, Task, str], Result],
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
     receive: Callable[..., object] = lambda *_: None,
 ) -> Iterator[tuple[Task, Result]]:
-    """Tasks and what `work(shared, task, line)` makes of them, in the order in which they finish.
+    """Tasks and what `work(shared, task, topic)` makes of them, in the order in which they finish.
 
     A task whose worker dies is done by another one; while there is no worker at all it waits for one.
 
     shared : sent once to each worker. tasks : with a key each. name : of the whole work.
-    receive : called in this thread with the key of a task and each message that it sends by its line.
+    receive : called in this thread with the key of a task and each message that it sends by its topic.
 
     Raises ShipidError where the scheduler does not answer, and, when all others are done, for a task that has killed
     worker after worker. What `work` raises is raised here.
@@ -135,7 +115,7 @@ def _without_logs(*names: str) -> Iterator[None]:
 
 def _results(
     client: Any,
-    work: Callable[[Shared, Task, Line], Result],
+    work: Callable[[Shared, Task, str], Result],
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
@@ -154,7 +134,7 @@ def _results(
         for key, task in tasks:
             topic = f"{name}-{key}"
             client.subscribe_topic(topic, lambda event, key=key: came.put((key, event[1])))
-            future = client.submit(work, given, task, Line(topic), key=topic, pure=False)
+            future = client.submit(work, given, task, topic, key=topic, pure=False)
             left[key] = task, future
             future.add_done_callback(lambda future, key=key: came.put((key, future)))
         while left and mistake is None:
@@ -164,7 +144,7 @@ def _results(
                 lonely = _has_no_workers(client, lonely)
                 continue
             if isinstance(future, bytes):
-                receive(key, *pickle.loads(future))
+                receive(key, pickle.loads(future))
                 continue
             task, _ = left.pop(key)
             try:

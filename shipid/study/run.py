@@ -30,6 +30,7 @@ from shipid.errors import ResultError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
+from shipid.hybrid.method import Row
 from shipid.hybrid.method import TrialJournal as Searches
 from shipid.plugins import REGISTRIES, add_members, added_members
 from shipid.study import seals, store
@@ -42,7 +43,7 @@ from shipid.study.cells import (
     fit_method,
     work_of,
 )
-from shipid.study.cluster import Line, SentJournal, on_dask
+from shipid.study.cluster import SentJournal, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
@@ -264,8 +265,8 @@ def _compute(
     writer, kept = cache(journals), {file.stem: file.read_bytes() for file in (place / store.JOURNALS).glob("*.log")}
     tasks = [(unit.key, (unit, kept.get(unit.key, b""))) for unit in units]
 
-    def write(key: str, name: str, *given: Any) -> None:
-        getattr(writer(key), name)(*given)
+    def write(key: str, entries: Mapping[str, Sequence[Row | int]]) -> None:
+        writer(key).add(entries)
 
     shared = plan, prepared, means.device, own_code(plan), added_members()
     for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, write):
@@ -288,14 +289,14 @@ def _on_pool(
 
 
 def _on_cluster(
-    shared: tuple[Plan, PreparedStudy, str, Code, list[bytes]], task: tuple[Unit, bytes], line: Line
+    shared: tuple[Plan, PreparedStudy, str, Code, list[bytes]], task: tuple[Unit, bytes], topic: str
 ) -> tuple[list[dict[str, Any]], list[store.Cell]]:
     """A unit on a worker of a cluster: what it was computed with, before and after, and the results."""
     (plan, prepared, device, code, members), (unit, journal) = shared, task
     add_members(members)
     session = session_on(device, code_at_worker(plan, code))
     with TemporaryDirectory() as folder:
-        sent = SentJournal(Path(folder) / f"{unit.key}.log", journal, plan.digest, line)
+        sent = SentJournal(Path(folder) / f"{unit.key}.log", journal, plan.digest, topic)
         results = run_unit(plan, prepared, unit, device, sent)
     return [session, {**session, "engine": engine_description()}], results
 

@@ -38,6 +38,7 @@ from shipid.files import (
 )
 from shipid.foundations import SIMULATORS
 from shipid.foundations.predictions import PredictionTable
+from shipid.hybrid.search import SearchMethod
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.lock import sole_writer
@@ -347,7 +348,7 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
 
 
 def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = True) -> Path:
-    """`results.parquet`: a row per cell and metric; `trials.parquet`: per cell and trial; `trials.log`: all journals.
+    """`results.parquet`: a row per cell and metric; `trials.parquet`: per cell and trial; `trials.log`: for Optuna.
 
     whole : whether all cells are there; only then the tables have a seal, which says that a run has ended.
     """
@@ -362,11 +363,13 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
         for trial in mine
     ]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
-    keys = [unit.key for unit in plan.units]
-    if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in keys):
-        from shipid.hybrid.journal import merge_journals  # with Optuna, which a study is read without
+    spaces = {way.name: way.method.space() for way in plan.methods if isinstance(way.method, SearchMethod)}
+    searched = rows[rows["method"].isin([*spaces])]
+    if len(searched):
+        from shipid.hybrid.trials import write_searches  # with Optuna, which a study is read without
 
-        merge_journals(journals, folder / TRIALS)
+        places = zip(searched["cell"], searched["trials"], searched["method"], strict=True)
+        write_searches(folder / TRIALS, ((cell, mine, spaces[method]) for cell, mine, method in places))
     sweep_run(folder)  # again: a worker of a killed run may outlive it by a moment, and be gone only by now
     if whole:
         seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
@@ -471,10 +474,9 @@ def _take_unit(folder: Path, place: Path, key: str) -> None:
                 message = f"differs from {place / name}, of the same unit: delete one of the two with its seal"
                 raise ResultError(message, file=folder / name)
         return
-    for name in (*files, f"{JOURNALS}/{key}.log"):
-        if (place / name).is_file():
-            with replace_whole(folder / name) as temporary:
-                shutil.copyfile(place / name, temporary)
+    for name in files:
+        with replace_whole(folder / name) as temporary:
+            shutil.copyfile(place / name, temporary)
     seals.write_seal(folder, key, [folder / name for name in files])
 
 

@@ -56,11 +56,11 @@ class Stopping(Journal):
 
     left = 0
 
-    def add(self, rows: Any, space: Any) -> None:
+    def add(self, entries: Any) -> None:
         if self.left <= 0:
             raise Stopped
         self.left -= 1
-        super().add(rows, space)
+        super().add(entries)
 
 
 def digits(fits: Any, here: World, kind: str) -> dict[str, Any]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from optuna.distributions import FloatDistribution
-
 from shipid.files import write_json
 from shipid.hybrid.journal import Journal
 from shipid.study import seals
@@ -14,7 +12,6 @@ from shipid.study.check import search_words
 from shipid.study.store import JOURNALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
-SPACE = {"units": FloatDistribution(1, 100, log=True)}
 ONE, OTHER = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
 
 
@@ -29,12 +26,12 @@ def test_a_search_is_followed_trial_by_trial_until_its_unit_is_finished(tmp_path
     assert search_words(plan, tmp_path) == ""
     journal = Journal(file)
     assert search_words(plan, tmp_path) == ""
-    journal.add({ONE: [row(0, 0.25)]}, SPACE)
+    journal.add({ONE: [row(0, 0.25)]})
     assert search_words(plan, tmp_path) == f"{ONE}: trial 1/5"
-    journal.add({OTHER: [row(0, float("nan"))]}, SPACE)
+    journal.add({OTHER: [row(0, float("nan"))]})
     assert search_words(plan, tmp_path) == f"{OTHER}: trial 1/5"
-    journal.decide([ONE], 12)  # of a budget
-    journal.add({ONE: [row(1, 0.04)]}, SPACE)
+    journal.add({ONE: [12]})  # of a budget
+    journal.add({ONE: [row(1, 0.04)]})
     with file.open("a") as stream:
         stream.write('{"op_')  # half a line, by another process
     assert search_words(plan, tmp_path) == f"{ONE}: trial 2/12"
@@ -47,5 +44,5 @@ def test_searches_of_parts_are_followed(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"method.0.trials": 5, "repeat": {"split.seed": [0, 1]}})
     file = part_folder(tmp_path, list(plan.parts)[1]) / JOURNALS / "unit.log"
     file.parent.mkdir(parents=True)
-    Journal(file).add({ONE: [row(0, 1.0)]}, SPACE)
+    Journal(file).add({ONE: [row(0, 1.0)]})
     assert search_words(plan, tmp_path).startswith(f"{ONE}: trial 1/5")
