@@ -60,7 +60,7 @@ class ExportModel:
         corrector, bands = self.predictor.corrector, self.predictor.bands
         if isinstance(corrector, MeanCorrector):
             raise ShipidError("a mean over foundations cannot be exported: export the cells of its foundations")
-        if hasattr(corrector, "trace_onnx"):
+        if getattr(corrector, "of_torch", False):
             raise ShipidError(
                 f"a predictor by the method {self.predictor.method} cannot be exported so: its networks are of "
                 "PyTorch, export them to onnx"

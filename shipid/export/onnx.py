@@ -12,6 +12,7 @@ from shipid.errors import ShipidError
 from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator, Layers, Normaliser
+from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.method import Array
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.units import Units
@@ -27,54 +28,24 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     `compensation` (S, T, 2) [m], of `one-step` `acceleration` (S, 3) [m/s^2, rad/s^2]. A network of a user has the
     inputs `past` (P + 1, S, d), the oldest first, and `now` (S, e), in single precision.
     """
-    trace, provenance = getattr(model.predictor.corrector, "trace_onnx", None), dict(model.predictor.provenance)
-    networks, result, shape = _networks_to_write(model) if trace is None else ([], "", [])
+    predictor = model.predictor
+    plain = not getattr(predictor.corrector, "of_torch", False)
+    networks, result = _networks_to_write(predictor) if plain else ([], "compensation")
     try:
-        from onnx import TensorProto, checker, helper, load, numpy_helper, save
+        from onnx import checker, helper, load, save
     except ImportError:
         raise ShipidError("an ONNX file needs the package onnx: pip install 'shipid[export]'") from None
-    if trace is not None:
-        with replace_whole(file) as temporary:
-            inputs, traced = json.dumps(trace(temporary)), load(str(temporary))
-            helper.set_model_props(traced, {"inputs": inputs, "provenance": json.dumps(provenance, default=str)})
-            save(traced, str(temporary))
-        return file
-    kind = np.dtype(np.float32 if single else np.float64)
-    names = list(dict.fromkeys(each for normaliser, _ in networks for each in normaliser.names))
-    nodes: list[Any] = []
-    constants: list[Any] = []
+    from shipid.hybrid import network  # with PyTorch
 
-    def constant(values: Any, dtype: Any = kind) -> str:
-        constants.append(numpy_helper.from_array(np.asarray(values, dtype=dtype), f"c{len(constants)}"))
-        return f"c{len(constants) - 1}"
-
-    def node(operation: str, *inputs: str, to: str = "", **attributes: Any) -> str:
-        output = to or f"v{len(nodes)}"
-        nodes.append(helper.make_node(operation, list(inputs), [output], **attributes))
-        return output
-
-    outputs = []
-    for normaliser, layers in networks:
-        places = constant([names.index(each) for each in normaliser.names], np.int64)
-        x = node("Sub", node("Gather", "inputs", places, axis=1), constant(normaliser.mean))
-        x = node("Div", x, constant(normaliser.std))
-        for number, (weight, bias) in enumerate(layers):
-            x = node("Tanh", x) if number else x
-            x = node("Add", node("MatMul", x, constant(weight)), constant(bias))
-        outputs.append(x)
-    mean = node("Div", node("Sum", *outputs), constant(float(len(outputs))))
-    node("Reshape", mean, constant([-1, *shape], np.int64), to=result)
-    number_type = TensorProto.FLOAT if single else TensorProto.DOUBLE
-    ends = [helper.make_tensor_value_info("inputs", number_type, ["S", len(names)])]
-    results = [helper.make_tensor_value_info(result, number_type, ["S", *shape])]
-    graph = helper.make_graph(nodes, name, ends, results, constants)
-    opset = [helper.make_opsetid("", OPSET)]
-    made = helper.make_model(graph, opset_imports=opset, producer_name="shipid", producer_version=__version__)
-    made.ir_version = 8
-    helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": json.dumps(provenance, default=str)})
-    checker.check_model(made)
+    trained: Any = predictor.corrector
+    whole = network.MeasuredLayers(networks, single) if plain else network.MeasuredNetworks(trained.networks)
     with replace_whole(file) as temporary:
-        save(made, str(temporary))
+        network.trace_module(whole, result, temporary, OPSET)
+        traced, provenance = load(str(temporary)), json.dumps(dict(predictor.provenance), default=str)
+        traced.graph.name, traced.producer_name, traced.producer_version = name, "shipid", __version__
+        helper.set_model_props(traced, {"inputs": json.dumps(whole.names), "provenance": provenance})
+        checker.check_model(traced)
+        save(traced, str(temporary))
     return file
 
 
@@ -89,21 +60,16 @@ def layers_of_units(units: Units, even: Array, odd: Array) -> Layers:
     return (inner, np.tile(units.offset, 2)), (outer, np.r_[even[0], np.zeros(odd.shape[1])])
 
 
-def _networks_to_write(model: ExportModel) -> tuple[list[tuple[Normaliser, Layers]], str, list[int]]:
-    """The networks with outputs that are what they add, its name, and its shape for an instant."""
-    corrector, horizon = model.predictor.corrector, model.layout.horizon
+def _networks_to_write(predictor: DeployedMethod) -> tuple[list[tuple[Normaliser, Layers, Array | None]], str]:
+    """The networks, each with the basis that its outputs weigh, if any, and the name of what they add."""
+    corrector = predictor.corrector
     if isinstance(corrector, OneStepCorrector):
         heads = [(head.units, head.surge, head.sway_yaw) for head in corrector.heads]
-        return [(parts[0].normaliser, layers_of_units(*parts)) for parts in heads], "acceleration", [3]
+        return [(parts[0].normaliser, layers_of_units(*parts), None) for parts in heads], "acceleration"
     if not isinstance(corrector, Compensator):
         raise ShipidError(
-            f"the method {model.predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "
+            f"the method {predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "
             "path-refined, path-trained, calibrator and one-step; export this one to c, fmu or casadi",
             path="--to",
         )
-    networks = []
-    for network in corrector.networks:
-        *hidden, (weight, bias) = network.layers
-        shapes = np.kron(np.eye(2), network.basis.T).reshape(-1, 2, horizon).swapaxes(1, 2).reshape(-1, 2 * horizon)
-        networks.append((network.normaliser, (*hidden, (weight @ shapes, bias @ shapes))))
-    return networks, "compensation", [horizon, 2]
+    return [(one.normaliser, one.layers, one.basis) for one in corrector.networks], "compensation"

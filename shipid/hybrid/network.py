@@ -20,6 +20,7 @@ from torch import Tensor
 from torch.func import functional_call
 
 from shipid.errors import ResultError
+from shipid.hybrid.compensator import Layers, Normaliser
 from shipid.hybrid.method import Array
 from shipid.hybrid.methods import METHODS, method_kind
 from shipid.hybrid.recurrent import (
@@ -70,56 +71,93 @@ class TrainedModule(GatedNetwork):
 class MeasuredNetworks(torch.nn.Module):
     """Networks with what is around them: past (P + 1, S, d) and now (S, e) as measured -> compensation (S, T, 2) [m].
 
-    past, now : names of the last axis of what goes in.
+    In single precision: runtimes have no recurrent units in double. zeros : an example of what goes in, by name.
+    names : of the last axis of each.
     """
 
     def __init__(self, networks: Sequence[TrainedModule]) -> None:
         super().__init__()
         self.networks, self.parts = networks, torch.nn.ModuleList([one.module() for one in networks]).float()
-        self.past = tuple(dict.fromkeys(name for one in networks for name in one.reader.past.names))
-        self.now = tuple(dict.fromkeys(name for one in networks for name in one.reader.now.names))
+        self.names = {
+            side: list(dict.fromkeys(name for one in networks for name in getattr(one.reader, side).names))
+            for side in ("past", "now")
+        }
+        past, now = (torch.zeros(1, len(names)) for names in self.names.values())
+        self.zeros = {"past": past.expand(networks[0].reader.steps + 1, -1, -1), "now": now}
 
     def forward(self, past: Tensor, now: Tensor) -> Tensor:
         """Normalise, ask every network, also with port and starboard exchanged, and weigh the basis."""
         tensor, paths = partial(torch.tensor, dtype=torch.float32), []
         for module, one in zip(self.parts, self.networks, strict=True):
-            sides = ((past, self.past, one.reader.past), (now, self.now, one.reader.now))
             seen = [
-                (given[..., [names.index(name) for name in norm.names]] - tensor(norm.mean)) / tensor(norm.std)
-                for given, names, norm in sides
+                _normalise_tensor(past, self.names["past"], one.reader.past),
+                _normalise_tensor(now, self.names["now"], one.reader.now),
             ]
-            outputs = module(*seen).unflatten(1, (2, -1))
+            outputs = module(*seen)
             if one.reader.mirrors is not None:
                 images = [side @ tensor(mirror) for side, mirror in zip(seen, one.reader.mirrors, strict=True)]
-                outputs = (outputs + tensor([[1.0], [-1.0]]) * module(*images).unflatten(1, (2, -1))) / 2
-            paths.append((outputs @ tensor(one.basis.T)).swapaxes(1, 2))
+                half = tensor(np.repeat([1.0, -1.0], one.basis.shape[1]))
+                outputs = (outputs + half * module(*images)) / 2
+            paths.append(_weigh_basis(outputs, one.basis))
         return torch.stack(paths).mean(dim=0)
+
+
+class MeasuredLayers(torch.nn.Module):
+    """Plain networks with what is around them: inputs (S, d) as measured -> the mean of their outputs (S, ...).
+
+    networks : normaliser, layers, and the basis (T, r) [m] that the outputs weigh, if any. zeros, names : as of
+        `MeasuredNetworks`.
+    """
+
+    def __init__(self, networks: Sequence[tuple[Normaliser, Layers, Array | None]], single: bool) -> None:
+        super().__init__()
+        self.networks, self.names = networks, list(dict.fromkeys(name for one, *_ in networks for name in one.names))
+        kind = torch.float32 if single else torch.float64
+        self.zeros = {"inputs": torch.zeros(1, len(self.names), dtype=kind)}
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Normalise, ask every network, and weigh the basis."""
+        outputs, tensor = [], partial(torch.tensor, dtype=inputs.dtype)
+        for normaliser, layers, basis in self.networks:
+            x = _normalise_tensor(inputs, self.names, normaliser)
+            for number, (weight, bias) in enumerate(layers):
+                x = (x.tanh() if number else x) @ tensor(weight) + tensor(bias)
+            outputs.append(x if basis is None else _weigh_basis(x, basis))
+        return torch.stack(outputs).mean(dim=0)
+
+
+def _normalise_tensor(given: Tensor, names: list[str], normaliser: Normaliser) -> Tensor:
+    mean, std = (torch.tensor(each, dtype=given.dtype) for each in (normaliser.mean, normaliser.std))
+    return (given[..., [names.index(name) for name in normaliser.names]] - mean) / std
+
+
+def _weigh_basis(outputs: Tensor, basis: Array) -> Tensor:
+    """Paths (S, T, 2) [m] of outputs (S, 2 r), see `weigh_shapes`."""
+    return (outputs.unflatten(1, (2, -1)) @ torch.tensor(basis.T, dtype=outputs.dtype)).swapaxes(1, 2)
+
+
+def trace_module(whole: MeasuredNetworks | MeasuredLayers, result: str, file: Path, opset: int) -> None:
+    """Write a module as ONNX; `result` is the name of its output."""
+    axes = {name: {zeros.ndim - 2: "S"} for name, zeros in whole.zeros.items()} | {result: {0: "S"}}
+    with warnings.catch_warnings(action="ignore"):  # what PyTorch takes for constants are constants
+        torch.onnx.export(
+            whole.eval(),
+            tuple(whole.zeros.values()),
+            str(file),
+            dynamo=False,
+            opset_version=opset,
+            input_names=list(whole.zeros),
+            output_names=[result],
+            dynamic_axes=axes,
+        )
 
 
 @dataclass(frozen=True)
 class NetworkCorrector(RecurrentCorrector):
     """The mean of the networks of the folds."""
 
+    of_torch: ClassVar[bool] = True
     networks: tuple[TrainedModule, ...]
-
-    def trace_onnx(self, file: Path) -> dict[str, tuple[str, ...]]:
-        """Write the networks as ONNX; names of the last axis of the inputs `past` and `now`.
-
-        In single precision: runtimes have no recurrent units in double.
-        """
-        whole = MeasuredNetworks(self.networks).eval()
-        zeros = torch.zeros(self.networks[0].reader.steps + 1, 1, len(whole.past)), torch.zeros(1, len(whole.now))
-        with warnings.catch_warnings(action="ignore"):  # what PyTorch takes for constants are constants
-            torch.onnx.export(
-                whole,
-                zeros,
-                str(file),
-                dynamo=False,
-                input_names=["past", "now"],
-                output_names=["compensation"],
-                dynamic_axes={"past": {1: "S"}, "now": {0: "S"}, "compensation": {0: "S"}},
-            )
-        return {"past": whole.past, "now": whole.now}
 
 
 class NetworkProblem(RecurrentProblem):
