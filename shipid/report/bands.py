@@ -55,7 +55,7 @@ def coverage_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="coverage",
         title="What bands promise, and what they hold",
-        takeaway=_takeaway_coverage(frame, counts[-1]),
+        takeaway=content.sentence_of("coverage", f"Bands of {counted_text(banded, 'model')} are calibrated."),
         how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
         "and counts runs, not windows. Measured on the test runs, on which no cell trained. Bars are exact binomial "
@@ -93,23 +93,6 @@ def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str]
 
 def _share_words(row: dict[Hashable, Any]) -> str:
     return f"{percent_text(row['coverage'])} [{percent_text(row['low'])}, {percent_text(row['high'])}]"
-
-
-def _takeaway_coverage(frame: pd.DataFrame, size: int) -> str:
-    level = _level_of_sentences(frame[frame.N_D.eq(size)] if frame.N_D.eq(size).any() else frame)
-    mine = frame[frame.N_D.eq(size) & frame.level.eq(level)].sort_values("width")
-    if mine.empty:
-        return f"No band is promised at N_D = {size}."
-    below = mine[mine.high < level].sort_index()
-    least, most = mine.iloc[0], mine.iloc[-1]
-    text = (
-        f"With N_D = {size}, bands of {level_text(level)} hold {percent_text(float(mine.coverage.mean()))} of the test "
-    )
-    text += f"paths on average over {counted_text(len(mine), 'model')}; the mean radius is {metres_text(least.width)} "
-    text += f"({least.model})" + (f" to {metres_text(most.width)} ({most.model}). " if len(mine) > 1 else ". ")
-    if below.empty:
-        return text + "No interval lies below its promise."
-    return text + f"Below their promise, interval and all: {join_few_names([str(name) for name in below.model])}."
 
 
 def width_figure(content: ReportContent) -> PageFigure | None:

@@ -139,6 +139,10 @@ class ReportContent(PageContent):
         object.__setattr__(self, "frames", {name: name_models(frame) for name, frame in self.frames.items()})
         object.__setattr__(self, "alone", {model_text(model) for model in self.alone})
 
+    def sentence_of(self, figure: str, otherwise: str = "") -> str:
+        """First sentence of the answer that a figure carries; something else where there is none."""
+        return next((one.text for one in self.answer if one.figure == figure), otherwise)
+
     def frame(self, name: str) -> pd.DataFrame:
         """One of `frames`; without rows and columns where there is none of that name."""
         return self.frames.get(name, pd.DataFrame())

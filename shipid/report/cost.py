@@ -50,9 +50,9 @@ def frontier_figure(content: ReportContent) -> PageFigure:
     return PageFigure(
         id="frontier",
         title="What to buy: error over price",
-        takeaway="".join([f"{one.text} " for one in content.answer if one.figure == "frontier"][:1])
-        + f"From {metres_text(best['H_end'].max())} for {price_text(best['price'].min(), unit)} to "
-        f"{metres_text(best['H_end'].min())} for {price_text(best['price'].max(), unit)}.",
+        takeaway=f"{content.sentence_of('frontier')} From {metres_text(best['H_end'].max())} for "
+        f"{price_text(best['price'].min(), unit)} to {metres_text(best['H_end'].min())} for "
+        f"{price_text(best['price'].max(), unit)}.".lstrip(),
         how="Each point is a number of runs with one physics: its price, and the median of the error at the horizon as "
         "the law of exchange expects it, given the cells of this study. The law was learned from simulated ships. "
         "Points with a ring are on the frontier: no cheaper way has a lower error." + goal,

@@ -40,7 +40,6 @@ from shipid.report.selection import (
     errors_alone,
     errors_over_seeds,
     family_words,
-    in_words,
     model_chips,
     model_styles,
     nothing_learns,
@@ -97,7 +96,7 @@ def map_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="map",
         title="Physics and data: the map",
-        takeaway=_takeaway_map(shown),
+        takeaway=content.sentence_of("map", _ends_of_errors(cells[cells.N_D > 0])),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour and number are H, the "
         "mean error over the horizon, mean over seeds. N_D = 0 is the physics alone, whose H is A: read A "
         "there, since rows that would touch are moved apart."
@@ -250,21 +249,8 @@ def ends_of_map(cells: pd.DataFrame) -> str:
     return " to ".join(f"{metres_text(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
 
 
-def _takeaway_map(shown: CellMap) -> str:
-    """Where H is lowest and highest, and up to which A physics helped at every N_D."""
-    good, rival = shown.cells[shown.cells.H.notna() & (shown.cells.N_D > 0)], _model_without_physics(shown.rows)
-    text = f"H, the mean over the horizon, runs from {ends_of_map(good)}"
-    pure = good.family.eq(DATA_DRIVEN)
-    physics = good[~pure & good.N_D.isin(good.N_D[pure])]
-    if physics.empty:
-        return f"{text}."
-    text += "; by means, without a test, H is"
-    if not physics.worse.any():
-        return f"{text} below that of {rival} in all {counted_text(len(physics), 'cell')} with physics."
-    limit = float(physics.A[physics.worse].min())
-    return f"{text} not below that of {rival} in {physics.worse.sum()} of {len(physics)} cells with physics" + (
-        f", all with A = {metres_text(limit)} or more." if physics.A.lt(limit).any() else "."
-    )
+def _ends_of_errors(cells: pd.DataFrame) -> str:
+    return f"H runs from {ends_of_map(cells)}." if cells.H.notna().any() else "No cell gave a result."
 
 
 def cells_without_result(content: ReportContent) -> str:
@@ -303,7 +289,7 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="gain",
         title="What another manoeuvre buys",
-        takeaway=_takeaway_sizes(content, learned),
+        takeaway=content.sentence_of("gain", _ends_of_errors(learned)),
         how="Position error at the horizon, or over all predicted points of all windows of all test manoeuvres: their "
         "mean is H (15), or A (14) for the physics alone, at N_D = 0. Where a cell has several seeds, the line joins "
         "their means and the pale points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate "
@@ -370,21 +356,6 @@ def _draw_sizes(
         traces.append(make_line(REGRESSION, known.N_D, known[column], ["regression"], line=dotted))
     x = make_axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
     return make_plot(traces, x, log_axis(title) if logarithmic else make_axis(title, rangemode="tozero"))
-
-
-def _takeaway_sizes(content: ReportContent, learned: pd.DataFrame) -> str:
-    if learned.empty:
-        return "No cell gave a result."
-    column, words = ("H_end", "At the horizon") if learned.H_end.notna().any() else ("H", "Over the horizon")
-    parts = []
-    for size in dict.fromkeys((learned.N_D.min(), learned.N_D.max())):
-        mine = learned[learned.N_D.eq(size)].set_index("model")[column]
-        named = [name for name in (content.best, data_driven(content)) if name and name in mine.index]
-        known = " and ".join(f"{in_words(name)} errs by {metres_text(mine[name])}" for name in named)
-        known = known or f"errors run from {metres_text(mine.min())} to {metres_text(mine.max())}"
-        parts.append(f"with N_D = {size} {known}")
-    best = f" {content.best} is the best in validation." if content.best else ""
-    return f"{words}, by means, without a test: {'; '.join(parts)}.{best}"
 
 
 WHAT_PHYSICS_AND_DATA_BUY = Section(

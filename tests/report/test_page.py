@@ -261,7 +261,7 @@ def test_it_is_written_from_cells_alone(full_scale):
 
 def test_it_is_written_when_every_cell_failed(full_scale):
     cells = full_scale.cells.assign(H=np.nan, H_90=np.nan, rms=np.nan, status="failed", sentence="no memory left")
-    text = render(replace(full_scale, cells=cells))
+    text = render(replace(full_scale, cells=cells, answer=()))
     assert "No cell gave a result." in text
     assert "failed: no memory left" in text
 
