@@ -145,17 +145,16 @@ def compute_ship(ship: str) -> dict[str, Any]:
 
 def errors_of(plan: Any, prepared: Any) -> dict[str, Any]:
     """Errors [m] on the test of each physics and of means, alone and with five runs, and which is best on these."""
-    names = [name for name in prepared.test_paths if name == "guess" or name.startswith("near-")]
-    alone = {name: float(position_error(prepared.test_paths[name], prepared.test.future).mean()) for name in names}
+    known = prepared.known
+    names = [name for name in known if name == "guess" or name.startswith("near-")]
+    alone = {name: float(position_error(known[name].test_paths, prepared.test.future).mean()) for name in names}
 
-    def mean_error(of: Sequence[str], known: Any = prepared.test_paths) -> float:
-        paths = np.mean([known[name] for name in of], axis=0)
+    def mean_error(of: Sequence[str], by_name: Any = None) -> float:
+        paths = np.mean([by_name[name] if by_name else known[name].test_paths for name in of], axis=0)
         return float(position_error(paths, prepared.test.future).mean())
 
     rows = np.isin(prepared.pool.run, runs_by_amount(plan.study, prepared.pool)[RUNS])
-    on_runs = {
-        name: float(position_error(prepared.pool_paths[name], prepared.pool.future)[..., rows].mean()) for name in names
-    }
+    on_runs = {name: float(position_error(known[name].paths, prepared.pool.future)[..., rows].mean()) for name in names}
     near, best = [f"near-{place}" for place in range(1, NEAREST + 1)], sorted(on_runs, key=on_runs.__getitem__)
     result = {
         "guess": alone["guess"],

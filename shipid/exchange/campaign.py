@@ -273,7 +273,7 @@ def study_ship(name: str, seed: int, drawn: int, amounts: Iterable[int], part: P
         error = position_error(paths, test.future)
         return [float(error[:end].mean()) for end in ends]
 
-    alone = {one: mean_errors(paths) for one, paths in prepared.test_paths.items()}
+    alone = {one: mean_errors(predicted.test_paths) for one, predicted in prepared.known.items()}
     kept: dict[str, list[Any]] = read_json(part) if part.exists() else {}
     for unit in plan.units:
         if unit.key not in kept:

@@ -44,7 +44,7 @@ def meet_ship(vessel: str, ahead: float, out: Path) -> UnseenShip:
     document.pop("claims")
     plan = build_plan(document, out, draft.vessels)
     prepared = prepare(plan, obtain_runs(plan))
-    floor = position_error(prepared.test_paths["nominal"], prepared.test.future).mean()
+    floor = position_error(prepared.known["nominal"].test_paths, prepared.test.future).mean()
     return UnseenShip(
         float(ship.length or np.nan), vessel_service_speed(ship), float(prepared.naive.mean()), float(floor)
     )

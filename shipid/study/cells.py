@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,18 +22,17 @@ from shipid.metrics import (
     summarise_errors,
     vector_lengths,
 )
-from shipid.observer import Estimates
 from shipid.predictor import Array, Predictor, limits_of, refit_folds, with_bands
 from shipid.study.declared import Foundation, StudyMethod
 from shipid.study.plan import Batch, Unit
 from shipid.study.prepare import (
+    FoundationPrediction,
     PreparedStudy,
     at_instants,
     chosen_observer,
-    estimates_of,
     instants_of,
-    paths_of,
     physics_of,
+    predict_foundation,
     rows_apart_from_test,
     rows_outside_test,
     window_memory,
@@ -130,11 +129,7 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
         for name in names
     }
     kept = rows_outside_test(prepared.data, prepared.test)
-    seen = replace(
-        prepared,
-        data=rows_apart_from_test(prepared.data, prepared.test),
-        estimates={name: known.select(kept) for name, known in prepared.estimates.items()},
-    )
+    seen = replace(prepared, data=rows_apart_from_test(prepared.data, prepared.test))
     place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(batch)))
     try:
         folds = refit_folds(windows, refits, batch.seed)
@@ -142,16 +137,18 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
         folds = []
     for training, judged in folds:
         rest, part = windows.select(training), windows.select(judged)
-        inside = replace(
-            seen,
-            pool=rest,
-            test=part,
-            pool_paths={name: paths[:, place[training]] for name, paths in prepared.pool_paths.items()},
-            test_paths={name: paths[:, place[judged]] for name, paths in prepared.pool_paths.items()},
-            diverged={
-                name: (pool[place[training]], pool[place[judged]]) for name, (pool, _) in prepared.diverged.items()
-            },
-        )
+        on_parts = {
+            name: replace(
+                one,
+                paths=one.paths[:, place[training]],
+                test_paths=one.paths[:, place[judged]],
+                diverged=one.diverged[place[training]],
+                test_diverged=one.diverged[place[judged]],
+                estimates=one.estimates and one.estimates.select(kept),
+            )
+            for name, one in prepared.known.items()
+        }
+        inside = replace(seen, pool=rest, test=part, known=on_parts)
         known = predictions(inside, tuple(rest.spans), work.device, {name for name, _ in left_out})
         again = work._replace(prepared=inside, windows=rest, known=known)
         for method, names in wanted.items():
@@ -292,7 +289,7 @@ def _test_errors(
     instants = instants_of(study, predictor.vessel, prepared.data, test, one.estimates)
     predictor.check_restored(instants, one.test_paths, way.method.corrector)
     moved = predictor.physics_with_force
-    lost = one.diverged if moved is predictor.physics else moved.variant_paths(instants)[1][0]
+    lost = one.test_diverged if moved is predictor.physics else moved.variant_paths(instants)[1][0]
     paths = predictor.predict(instants, one.test_paths)
     failed = ~(vector_lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(axis=0)
     if failed.any():
@@ -339,27 +336,6 @@ def _predictor(
     )
 
 
-@dataclass(frozen=True)
-class FoundationPrediction:
-    """What a foundation of one batch predicts before any method improves it.
-
-    foundation : with the numbers that were identified and the observer that was chosen, if any.
-    paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
-    diverged : (S,) the test windows on which it diverges.
-    sentence : the message of the identification; empty where nothing was identified. seconds : core-seconds that
-        identification and choice took.
-    estimates : what the observer knows at every row of the runs; None without one.
-    """
-
-    foundation: Foundation
-    paths: Array
-    test_paths: Array
-    diverged: Array
-    sentence: str = ""
-    seconds: float = 0.0
-    estimates: Estimates | None = None
-
-
 def predictions(
     prepared: PreparedStudy, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
 ) -> dict[str, FoundationPrediction]:
@@ -371,17 +347,15 @@ def predictions(
     windows = prepared.pool.select(mask)
     result = {}
     data: Dataset | None = None
-    known: dict[Any, Solution] = {}
-    for one in prepared.foundations:
-        if wanted is not None and one.name not in wanted:
+    solved: dict[Any, Solution] = {}
+    for name, one in prepared.known.items():
+        if wanted is not None and name not in wanted:
             continue
-        if not one.fitted:
-            paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
-            lost, known_of_it = prepared.diverged[one.name][1], prepared.estimates.get(one.name)
-            result[one.name] = FoundationPrediction(one, *paths, lost, estimates=known_of_it)
+        if not one.foundation.fitted:
+            result[name] = replace(one, paths=one.paths[:, mask], diverged=one.diverged[mask])
         else:
             data = rows_apart_from_test(prepared.data, prepared.test) if data is None else data
-            result[one.name] = _fit_foundation(prepared, one, runs, data, windows, device, known)
+            result[name] = _fit_foundation(prepared, one.foundation, runs, data, windows, device, solved)
     return result
 
 
@@ -399,7 +373,7 @@ def _fit_foundation(
     Where that fails, its paths are no numbers, and the sentence says why.
     """
     study = prepared.study
-    now, sentence, seconds, estimates = foundation, "", 0.0, None
+    now, sentence, seconds = foundation, "", 0.0
     try:
         variant, vessel = foundation.variant, foundation.vessel
         if foundation.identify is not None and variant is not None and vessel is not None:
@@ -413,17 +387,15 @@ def _fit_foundation(
             values: Mapping[str, float] = {**variant.values, **known[key].values}
             now = replace(foundation, variant=replace(variant, values=values))
             sentence, seconds = known[key].sentence, known[key].seconds
-        if now.observer is not None:
+        if now.observer is not None and now.observer.choose:
             begun = time.thread_time()
-            if now.observer.choose:
-                now = replace(now, observer=chosen_observer(study, now, data.select(runs), windows))
-                seconds += time.thread_time() - begun
-            calls = sum(one.observer is not None for one in prepared.foundations)
-            estimates = estimates_of(study, now, prepared.data, prepared.test, calls)
-        paths = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
+            now = replace(now, observer=chosen_observer(study, now, data.select(runs), windows))
+            seconds += time.thread_time() - begun
+        calls = sum(one.observer is not None for one in prepared.foundations)
+        one = predict_foundation(study, prepared.data, (windows, prepared.test), now, device, calls)
     except ShipidError as error:
         words = "identification" if foundation.identify is not None else "observer"
         here, there = (np.full_like(part.future, np.nan) for part in (windows, prepared.test))
-        lost = np.zeros(len(prepared.test), bool)
-        return FoundationPrediction(foundation, here, there, lost, f"{words}: {error.message}")
-    return FoundationPrediction(now, paths.pool, paths.test, paths.diverged[1], sentence, seconds, estimates)
+        lost = np.zeros(len(windows), bool), np.zeros(len(prepared.test), bool)
+        return FoundationPrediction(foundation, here, there, *lost, sentence=f"{words}: {error.message}")
+    return replace(one, sentence=sentence, seconds=seconds)

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -68,8 +68,29 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw_variant
 
-Pair = tuple[Array, Array]
 MOST_REDRAWS = 100
+
+
+@dataclass(frozen=True)
+class FoundationPrediction:
+    """What a foundation predicts before any method improves it.
+
+    foundation : after redraws; with the numbers that were identified and the observer that was chosen, if any.
+    paths, test_paths : (T, S, 2) [m] in the frame (11) on windows of training and of the test; zeros without physics.
+    diverged, test_diverged : (S,) the windows on which it diverges.
+    estimates : what its observer knows at every row of the runs; None without one.
+    sentence : the message of the identification; empty where nothing was identified. seconds : core-seconds that
+        identification and choice took.
+    """
+
+    foundation: Foundation
+    paths: Array
+    test_paths: Array
+    diverged: Array
+    test_diverged: Array
+    estimates: Estimates | None = None
+    sentence: str = ""
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -79,11 +100,7 @@ class PreparedStudy:
     study : the checked document, with the seeds of its world.
     data : the runs themselves.
     pool, test : windows for training and validation, and windows of the untouched test runs.
-    foundations : after redraws, where a family asks for them.
-    pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics.
-    diverged : foundation -> windows of pool and test on which it diverges, (S,) each.
-    estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
-        depend on the batch.
+    known : foundation -> what it predicts on pool and test, by the numbers that it has before it is fitted to a batch.
     notes : what was assumed, redrawn or left out, in sentences.
     kinds : run -> kind of manoeuvre, see `kinds_of_runs`.
     """
@@ -92,13 +109,14 @@ class PreparedStudy:
     data: Dataset
     pool: Windows
     test: Windows
-    foundations: tuple[Foundation, ...]
-    pool_paths: Mapping[str, Array]
-    test_paths: Mapping[str, Array]
-    diverged: Mapping[str, Pair]
+    known: Mapping[str, FoundationPrediction]
     notes: tuple[str, ...]
-    estimates: Mapping[str, Estimates] = field(default_factory=dict)
     kinds: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def foundations(self) -> tuple[Foundation, ...]:
+        """The foundations, after redraws."""
+        return tuple(one.foundation for one in self.known.values())
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -288,20 +306,15 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
                 file=plan.file,
                 path=f"method.{way.name}.memory.states",
             )
-    estimates: dict[str, Estimates] = {}
     with _name_study_file(plan):
-        foundations, paths = _roll_out(plan, dataset, [rest, test], notes, device, estimates)
+        known = _roll_out(plan, dataset, [rest, test], notes, device)
     return PreparedStudy(
         study=plan.study,
         data=dataset,
         pool=rest,
         test=test,
-        foundations=foundations,
-        pool_paths={name: one.pool for name, one in paths.items()},
-        test_paths={name: one.test for name, one in paths.items()},
-        diverged={name: one.diverged for name, one in paths.items()},
+        known=known,
         notes=tuple(dict.fromkeys(notes)),
-        estimates=estimates,
         kinds=kinds_of_runs(dataset),
     )
 
@@ -337,54 +350,37 @@ def _test_runs(study: Study, windows: Windows) -> list[str]:
 Alike = tuple[str, ...]  # structure of a vessel and the numbers of its actuators: their hidden states are equal
 
 
-class PathsOfParts(NamedTuple):
-    """Paths (T, S, 2) [m] of a foundation, and the windows on which they diverge."""
-
-    pool: Array
-    test: Array
-    diverged: Pair
-
-
 def _roll_out(
-    plan: Plan,
-    dataset: Dataset,
-    parts: Sequence[Windows],
-    notes: list[str],
-    device: str,
-    estimates: dict[str, Estimates],
-) -> tuple[tuple[Foundation, ...], dict[str, PathsOfParts]]:
-    """Paths of every foundation, with the members that its family redraws; fills in the estimates."""
+    plan: Plan, dataset: Dataset, parts: Sequence[Windows], notes: list[str], device: str
+) -> dict[str, FoundationPrediction]:
+    """What every foundation predicts, with the members that its family redraws."""
     study, calls = plan.study, sum(one.observer is not None for one in plan.foundations)
     families = {family.name: family for family in plan.families}
-    finished: dict[str, tuple[Foundation, PathsOfParts]] = {}
+    known: dict[str, FoundationPrediction] = {}
     waiting = [one for one in plan.foundations if one.base and one.identify is None and one.observer is None]
-    known: dict[Alike, list[Instants]] = {}
+    instants: dict[Alike, list[Instants]] = {}
     while waiting:
         again = []
-        for foundation, paths in _one_round(study, dataset, parts, waiting, device, known):
-            family, lost = families[foundation.family], int(paths.diverged[0].sum())
+        for one in _one_round(study, dataset, parts, waiting, device, instants):
+            foundation, lost = one.foundation, int(one.diverged.sum())
+            family = families[foundation.family]
             words = f"{foundation.name} diverges on {percent_text(lost / len(parts[0]), 1)} of the training windows"
             fixed = foundation.vessel is not None and not any(block.drawn for block in family.perturb)
             if lost and (family.redraw or fixed):
                 again.append(_redraw(foundation, family, words, plan.file, notes))
                 continue
-            finished[foundation.name] = (foundation, paths)
+            known[foundation.name] = one
             if lost:
                 notes.append(f"{words}: its path goes on there, no farther than the present speed takes the ship")
         waiting = again
-    pool, test = (np.zeros_like(part.future) for part in parts)
-    zeros = PathsOfParts(pool, test, (np.zeros(len(parts[0]), bool), np.zeros(len(parts[1]), bool)))
     for foundation in plan.foundations:
-        if (foundation.identify or foundation.observer) and foundation.variant is not None:
-            same, paths = finished[foundation.variant.name]
-            derived = replace(foundation, variant=same.variant)
-            if derived.observer is not None and not derived.fitted:
-                estimates[derived.name] = estimated = estimates_of(study, derived, dataset, parts[1], calls)
-                paths = paths_of(study, dataset, parts, derived, device, estimated)
-            finished[foundation.name] = (derived, paths)
-        finished.setdefault(foundation.name, (foundation, zeros))
-    foundations = tuple(finished[foundation.name][0] for foundation in plan.foundations)
-    return foundations, {one.name: finished[one.name][1] for one in foundations}
+        if foundation.name not in known and foundation.variant is not None:
+            same = known[foundation.variant.name]
+            foundation = replace(foundation, variant=same.foundation.variant)
+            known[foundation.name] = replace(same, foundation=foundation)
+        if foundation.name not in known or (foundation.observer is not None and not foundation.fitted):
+            known[foundation.name] = predict_foundation(study, dataset, parts, foundation, device, calls)
+    return {one.name: known[one.name] for one in plan.foundations}
 
 
 def physics_of(study: Study, source: Vessel | Simulator | None, observer: Observer | None = None) -> Physics:
@@ -487,8 +483,8 @@ def _one_round(
     foundations: Sequence[Foundation],
     device: str,
     known: dict[Alike, list[Instants]],
-) -> Iterator[tuple[Foundation, PathsOfParts]]:
-    """Each foundation with its paths.
+) -> Iterator[FoundationPrediction]:
+    """What each foundation predicts.
 
     Foundations of one structure are one rollout. known : instants of earlier rounds, to which those of this are added.
     """
@@ -496,7 +492,7 @@ def _one_round(
     for foundation in foundations:
         vessel = foundation.vessel
         if vessel is None:  # a simulator is asked for one member at a time
-            yield foundation, paths_of(study, dataset, parts, foundation, device)
+            yield predict_foundation(study, dataset, parts, foundation, device)
             continue
         lags = (f"{path} {value}" for path, value in vessel.parameters.items() if ".actuator." in path)
         alike.setdefault((vessel.structure, *lags), []).append((foundation, vessel))
@@ -508,24 +504,21 @@ def _one_round(
         physics = physics_of(study, vessel)
         pool, test = (physics.variant_paths(instants, parameters, device) for instants in known[key])
         for place, (foundation, _) in enumerate(group):
-            yield foundation, PathsOfParts(pool[0][:, place], test[0][:, place], (pool[1][place], test[1][place]))
+            paths = pool[0][:, place], test[0][:, place]
+            yield FoundationPrediction(foundation, *paths, pool[1][place], test[1][place])
 
 
-def paths_of(
-    study: Study,
-    dataset: Dataset,
-    parts: Sequence[Windows],
-    foundation: Foundation,
-    device: str,
-    estimates: Estimates | None = None,
-) -> PathsOfParts:
-    """Paths of one foundation."""
+def predict_foundation(
+    study: Study, dataset: Dataset, parts: Sequence[Windows], foundation: Foundation, device: str, calls: int = 1
+) -> FoundationPrediction:
+    """What one foundation predicts on windows of training and of the test; `calls` as for `run_observer`."""
     vessel, physics = foundation.vessel, physics_of(study, foundation.source, foundation.observer)
+    estimates = estimates_of(study, foundation, dataset, parts[1], calls) if foundation.observer is not None else None
     pool, test = (
         physics.variant_paths(instants_of(study, vessel, dataset, windows, estimates), None, device)
         for windows in parts
     )
-    return PathsOfParts(pool[0][:, 0], test[0][:, 0], (pool[1][0], test[1][0]))
+    return FoundationPrediction(foundation, pool[0][:, 0], test[0][:, 0], pool[1][0], test[1][0], estimates)
 
 
 def _redraw(foundation: Foundation, family: Family, words: str, file: str, notes: list[str]) -> Foundation:

@@ -217,8 +217,8 @@ def _prepare_folder(
 
 def _paths_alone(prepared: PreparedStudy) -> dict[str, np.ndarray]:
     """Paths (T, S, 2) [m] on the test windows by foundation that is not fitted and no mean of others."""
-    fixed = [one.name for one in prepared.foundations if not one.fitted and not one.mean_of]
-    return {name: prepared.test_paths[name] for name in fixed}
+    every = prepared.known.items()
+    return {name: one.test_paths for name, one in every if not (one.foundation.fitted or one.foundation.mean_of)}
 
 
 def _check_common(folder: Path, prepared: PreparedStudy) -> None:
@@ -233,15 +233,15 @@ def _check_common(folder: Path, prepared: PreparedStudy) -> None:
 
 def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy) -> None:
     """Store what no unit computes, so that a report needs nothing else."""
-    test, lost, paths = prepared.test, prepared.diverged, _paths_alone(prepared)
+    test, paths = prepared.test, _paths_alone(prepared)
     store.write_test(folder, test, paths, prepared.naive, regression_paths(prepared, plan.batches))
     rows = input_envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
     known = {
-        one.name: accuracy_of(paths[one.name], test)
-        | {f"diverged_{part}": int(bad.sum()) for part, bad in zip(("training", "test"), lost[one.name], strict=True)}
-        for one in prepared.foundations
-        if one.name in paths and one.base is not None
+        name: accuracy_of(one.test_paths, test)
+        | {"diverged_training": int(one.diverged.sum()), "diverged_test": int(one.test_diverged.sum())}
+        for name, one in prepared.known.items()
+        if name in paths and one.foundation.base is not None
     }
     described = [{**foundation_record(one), **known.get(one.name, NO_ACCURACY)} for one in prepared.foundations]
     write_json(folder / store.FOUNDATIONS, described)

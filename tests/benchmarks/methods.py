@@ -47,13 +47,13 @@ def tune_cell(plan: Plan, prepared: PreparedStudy, cell: Cell, method: Method) -
     vessel = next(one.vessel for one in prepared.foundations if one.name == cell.model)
     physics = physics_of(plan.study, vessel)
     folds = prepared.folds(batch, windows, method.validation)
-    case = Case(physics, prepared.pool_paths[cell.model][:, mask])
+    case = Case(physics, prepared.known[cell.model].paths[:, mask])
     start = time.process_time()
     fit = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
     seconds = time.process_time() - start
     assert fit.corrector is not None
     instants = instants_of(plan.study, vessel, prepared.data, prepared.test)
-    paths = fit.corrector.predict(physics, instants, prepared.test_paths[cell.model])
+    paths = fit.corrector.predict(physics, instants, prepared.known[cell.model].test_paths)
     error = summarise_errors(position_error(paths, prepared.test.future))
     alone = None if cell.model == "none" else physics_errors(prepared, cell.model)["mean"]
     row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}

@@ -249,7 +249,7 @@ def function(seed: int) -> None:
         for name, values in sound.pool.columns.items():
             if not np.array_equal(values, prepared.pool.columns[name]):
                 raise Failure("mixed", f"the function has changed {name}")
-        if not np.isfinite(prepared.test_paths["theirs"]).all():
+        if not np.isfinite(prepared.known["theirs"].test_paths).all():
             raise Failure("mixed", "paths that are no number")
 
 
@@ -306,8 +306,8 @@ def predictions(seed: int) -> None:
             whole = table.set_index(keys).sort_index()[["north", "east"]]
             sound = kept.set_index(keys).sort_index()[["north", "east"]]
             if len(whole) == len(sound) and np.array_equal(whole.to_numpy(), sound.to_numpy()):
-                want = prepared_soundly()[1].test_paths["theirs"]
-                if not np.allclose(prepared.test_paths["table"], want, atol=1e-6):
+                want = prepared_soundly()[1].known["theirs"].test_paths
+                if not np.allclose(prepared.known["table"].test_paths, want, atol=1e-6):
                     raise Failure("mixed", "the order of rows changes paths")
 
 

@@ -49,9 +49,9 @@ def test_a_family_of_an_exported_vessel_is_that_of_the_vessel(tmp_path, commands
     dataset = obtain_runs(own)
     one, other = prepare(own, dataset), prepare(theirs, dataset)
     for name in ("one-1", "one-2"):
-        assert np.abs(one.pool_paths[name] - one.pool_paths["one-1"]).max() > 0.1 or name == "one-1"
-        np.testing.assert_allclose(other.pool_paths[name], one.pool_paths[name], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(other.test_paths[name], one.test_paths[name], rtol=0, atol=1e-9)
+        assert np.abs(one.known[name].paths - one.known["one-1"].paths).max() > 0.1 or name == "one-1"
+        np.testing.assert_allclose(other.known[name].paths, one.known[name].paths, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(other.known[name].test_paths, one.known[name].test_paths, rtol=0, atol=1e-9)
     assert any("starts from the state" in note for note in other.notes)
     assert any("rudder.delta +" in note and "turns to" in note for note in other.notes)
 
@@ -72,9 +72,9 @@ def test_the_truth_and_its_own_physics_agree(tmp_path, starts):
     assert (begun[0, 3] > 3) == starts  # else at rest, as it begins itself
     exact = study_of(tmp_path, {"fmu": table.name, "members": 1}, {"fmu": table.name}, "known")
     prepared = prepare(exact, dataset)
-    np.testing.assert_allclose(prepared.test_paths["one"], prepared.test.future, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(prepared.known["one"].test_paths, prepared.test.future, rtol=0, atol=1e-9)
     family = prepare(plan, dataset)
-    errors = [np.abs(family.test_paths[f"one-{k}"] - family.test.future).max() for k in (1, 2)]
+    errors = [np.abs(family.known[f"one-{k}"].test_paths - family.test.future).max() for k in (1, 2)]
     assert min(errors) > 0.01
     way = "starts from the state" if starts else "runs along each run"
     assert any(way in note for note in family.notes)
@@ -168,4 +168,4 @@ def test_a_ship_that_turns_the_other_way_is_refused(tmp_path):
     assert str(error.value.file) == str(table)
     assert error.value.message.startswith("rudder.delta")
     meant = replace(turned, study=turned.study.model_copy(update={"unusual": [key]}))
-    assert prepare(meant, dataset).test_paths["one-1"].size
+    assert prepare(meant, dataset).known["one-1"].test_paths.size

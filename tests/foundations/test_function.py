@@ -77,7 +77,7 @@ def test_a_family_of_its_numbers_is_the_family_of_the_vessel(tmp_path: Path) -> 
         paths = {f"hull.derivatives.{parameter}": factor for parameter, factor in factors.items()}
         changed = ship.with_values({path: ship.parameters[path] * factor for path, factor in paths.items()})
         physics = shipid.Physics(changed, plan.study.prediction.horizon, plan.study.prediction.step)
-        np.testing.assert_allclose(prepared.test_paths[name], physics.paths(prepared.test.instants()), atol=1e-9)
+        np.testing.assert_allclose(prepared.known[name].test_paths, physics.paths(prepared.test.instants()), atol=1e-9)
 
 
 def test_where_it_gives_no_number_the_path_goes_on_and_a_note_says_so(tmp_path: Path) -> None:
@@ -85,8 +85,8 @@ def test_where_it_gives_no_number_the_path_goes_on_and_a_note_says_so(tmp_path: 
     prepared = prepare(plan, obtain_runs(plan))
     lost = prepared.pool.columns["u"] > 2.0
     assert 0 < lost.sum() < len(lost)
-    np.testing.assert_array_equal(prepared.diverged["mine"][0], lost)
-    assert np.isfinite(prepared.pool_paths["mine"]).all()
+    np.testing.assert_array_equal(prepared.known["mine"].diverged, lost)
+    assert np.isfinite(prepared.known["mine"].paths).all()
     assert any(note.startswith("mine diverges on") for note in prepared.notes)
 
 

@@ -93,7 +93,7 @@ def test_a_table_that_seems_wrong_is_refused_unless_it_is_meant(
     with pytest.raises(DataError, match=f"{fault}.*; if it is meant so, write unusual = .*family.table.predictions"):
         prepare_table(tmp_path, table)
     meant = prepare_table(tmp_path, table, 'unusual = ["family.table.predictions"]')
-    assert meant.test_paths["table"].size
+    assert meant.known["table"].test_paths.size
 
 
 def test_a_poor_ship_is_not_accused(cut: StudyWindows) -> None:

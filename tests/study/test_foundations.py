@@ -141,12 +141,14 @@ def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Reco
     other = prepare(plan, Dataset(frame, dataset.metadata))
     assert (~shared & (frame["run"] == "d") & (frame["t"] > last)).sum() > 10
     assert shared.sum() > 10
-    for name, values in prepared.estimates["plain"].columns.items():
-        np.testing.assert_array_equal(values[~shared], other.estimates["plain"].columns[name][~shared], err_msg=name)
+    for name, values in prepared.known["plain"].estimates.columns.items():
+        np.testing.assert_array_equal(
+            values[~shared], other.known["plain"].estimates.columns[name][~shared], err_msg=name
+        )
     alone = run_observer(plan.foundations[1].vessel, dataset, plan.foundations[1].observer)  # type: ignore[arg-type]
     mine = (frame["run"] == "c").to_numpy()
     np.testing.assert_array_equal(
-        prepared.estimates["plain"].columns["observer.u"][mine], alone.columns["observer.u"][mine]
+        prepared.known["plain"].estimates.columns["observer.u"][mine], alone.columns["observer.u"][mine]
     )
 
 

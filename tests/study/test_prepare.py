@@ -107,7 +107,7 @@ def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     prepared = prepare(plan, obtain_runs(plan))
     assert physics_errors(prepared, "right")["rms"] < 1e-9
     assert physics_errors(prepared, "wrong-1")["mean"] > 0.01
-    np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
+    np.testing.assert_array_equal(prepared.known["none"].test_paths, 0.0)
 
 
 def test_noisy_fixes_are_judged_against_the_exact_path(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_members_that_diverge_in_training_are_redrawn_where_the_family_asks_for_
         redrawn += counter > 0
         if counter == 0:
             assert model.variant == planned.variant
-        assert np.isfinite(prepared.pool_paths[model.name]).all()
+        assert np.isfinite(prepared.known[model.name].paths).all()
     assert 0 < redrawn < 6
     assert len(followed) == 2
     again = prepare(plan, obtain_runs(plan))
@@ -186,7 +186,7 @@ def test_members_that_diverge_stay_and_go_no_farther_than_the_ship_at_its_presen
     models, counts = results.models.set_index("model"), 0
     for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
         assert model.variant == planned.variant
-        pool, test = prepared.diverged[model.name]
+        pool, test = prepared.known[model.name].diverged, prepared.known[model.name].test_diverged
         error = position_error(results.physics[model.name], prepared.test.future)
         way = np.linalg.norm(results.physics[model.name][:, test], axis=-1)
         assert (way <= np.outer(np.arange(1, len(way) + 1), prepared.test.step * speed[test]) * (1 + 1e-9)).all()
@@ -194,7 +194,7 @@ def test_members_that_diverge_stay_and_go_no_farther_than_the_ship_at_its_presen
         cell = next(row["cell"] for row in results.rows if row["model"] == model.name)
         aboard = Predictor.load(tmp_path / "run" / "cells" / f"{cell}.npz").alone(prepared.test.instants())
         np.testing.assert_array_equal(results.physics[model.name], aboard)
-        assert np.isfinite(prepared.test_paths[model.name]).all()
+        assert np.isfinite(prepared.known[model.name].test_paths).all()
         assert sum(model.name in note for note in prepared.notes) == pool.any()
         assert models.loc[model.name, "diverged_training"] == pool.sum()
         assert models.loc[model.name, "diverged_test"] == test.sum()
@@ -254,7 +254,8 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     for model in prepared.foundations[:-1]:
         assert model.variant is not None
         assert model.variant.counter == 0
-        assert [part.mean() for part in prepared.diverged[model.name]] == [0.0, 0.5]
+        one = prepared.known[model.name]
+        assert [part.mean() for part in (one.diverged, one.test_diverged)] == [0.0, 0.5]
     rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")}
     assert "physics diverges on 50.0 % of the test windows" in rows["brittle-1"]["sentence"]
     assert rows["brittle-1"]["H"] > 6.0, "the ship of this log stays where it is, though its speed is 6 m/s"
@@ -296,13 +297,13 @@ def test_perturbed_lags_have_separate_hidden_states(
     family["perturb"] = [{"parameters": ["thruster.*.actuator.n.T"], "factor": [0.2, 3.0], "together": True}]
     plan, _ = recorded(dataset, split={"test": 1}, family=[family])
     prepared = prepare(plan, dataset)
-    assert not np.allclose(prepared.test_paths["lagged-1"], prepared.test_paths["lagged-2"])
+    assert not np.allclose(prepared.known["lagged-1"].test_paths, prepared.known["lagged-2"].test_paths)
     for model in prepared.foundations[:-1]:
         vessel = model.vessel
         assert vessel is not None
         predictor = Predictor(Physics(vessel, 5, 1.0), "alone", UnchangedPath({}))
         paths = predictor.predict(instants_of(plan.study, vessel, dataset, prepared.test))
-        np.testing.assert_allclose(paths, prepared.test_paths[model.name], atol=1e-9)
+        np.testing.assert_allclose(paths, prepared.known[model.name].test_paths, atol=1e-9)
 
 
 def test_nothing_that_a_prediction_knows_depends_on_a_later_fix(

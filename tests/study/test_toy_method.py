@@ -64,7 +64,7 @@ def test_a_new_method_goes_through_a_whole_study(
     prepared = prepare(plan, read_dataset(folder / store.DATASET))
     batch = plan.batches[0]
     seen = np.isin(prepared.pool.run, prepared.runs(batch))
-    physics = prepared.pool_paths["right"][:, seen]
+    physics = prepared.known["right"].paths[:, seen]
     instants = prepared.pool.select(seen).instants()
     left = prepared.pool.future[:, seen] - predictor.corrector.predict(predictor.physics, instants, physics)
     for name in ("u", "v", "r"):

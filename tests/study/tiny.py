@@ -48,7 +48,7 @@ def whole_unit(plan: Plan, batch: Batch) -> Unit:
 
 def physics_errors(prepared: PreparedStudy, foundation: str) -> ErrorSummary:
     """Mean, 90th percentile and RMS error [m] of the physics alone on the test windows."""
-    return summarise_errors(position_error(prepared.test_paths[foundation], prepared.test.future))
+    return summarise_errors(position_error(prepared.known[foundation].test_paths, prepared.test.future))
 
 
 MIXED = [
