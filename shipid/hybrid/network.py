@@ -133,7 +133,8 @@ def _normalise_tensor(given: Tensor, names: list[str], normaliser: Normaliser) -
 
 def _weigh_basis(outputs: Tensor, basis: Array) -> Tensor:
     """Paths (S, T, 2) [m] of outputs (S, 2 r), see `weigh_shapes`."""
-    return (outputs.unflatten(1, (2, -1)) @ torch.tensor(basis.T, dtype=outputs.dtype)).swapaxes(1, 2)
+    weights = outputs.reshape(-1, 2, basis.shape[1])
+    return (weights @ torch.tensor(basis.T, dtype=outputs.dtype)).swapaxes(1, 2)
 
 
 def trace_module(whole: MeasuredNetworks | MeasuredLayers, result: str, file: Path, opset: int) -> None:
