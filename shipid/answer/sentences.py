@@ -150,7 +150,7 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
         (chart, _runs_that_physics_saves(case)),
     ]
     parts: list[tuple[str, Iterable[str]]] = [
-        ("gain", _headline(case)),
+        ("horizon", _headline(case)),
         ("methods", methods if len(learning) > 1 else ()),
         *(of_physics if plan.families else ()),
         ("cells", [several] if len(learning) > 1 else ()),

@@ -70,10 +70,12 @@ def horizon_figure(content: ReportContent) -> PageFigure:
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
     columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], figure_sizes(frame.N_D)
     means = over_seeds(frame, [*LINE_COLUMNS, "ahead"], columns)
+    last = means["mean"][means.ahead.eq(means.ahead.max())]
+    ends = f"{metres_text(last.min())} to {metres_text(last.max())}"
     return PageFigure(
         id="horizon",
         title="Error over the horizon",
-        takeaway=_takeaway_horizon(content, means, counts[-1]),
+        takeaway=content.sentence_of("horizon", f"At the horizon mean errors run from {ends}."),
         how="Position error of the points predicted that many seconds ahead, over all windows of all test manoeuvres, "
         "mean over seeds." + (BY_AXIS if "along" in columns else "") + _models_of_close_up(content),
         alternative="Lines of the position error that grow with the time ahead, one per model with and without "
@@ -200,20 +202,6 @@ def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFra
     x = make_axis("time in the run [s]", anchor=f"y{len(units) + 1}" if units else "y")
     y = make_axis("position error [m]", rangemode="tozero", domain=[len(units) * share, 1.0])
     return make_plot(traces, x, y, hovermode="x unified", **axes)
-
-
-def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) -> str:
-    end = means[means.ahead.eq(means.ahead.max()) & means.N_D.isin([0, size])]
-    together, alone = (end[end.source == source].set_index("model")["mean"] for source in ("cooperative", "physics"))
-    if together.empty:
-        return "No compensated model gave a prediction."
-    pure, best = data_driven(content) or "", content.best if content.best in together.index else str(together.idxmin())
-    text = (
-        f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is {metres_text(together[best])} off "
-    )
-    text += "on average" + (f", its physics alone {metres_text(alone[best])}" if best in alone.index else "")
-    rival = pure and pure != best and pure in together.index
-    return text + (f"; {in_words(pure)} {metres_text(together[pure])}: means, without a test." if rival else ".")
 
 
 def _worst_instant(content: ReportContent, means: pd.DataFrame) -> Any | None:

@@ -202,7 +202,7 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
             AnswerSentence(
                 "With 30 manoeuvres, a model of 3 m accuracy predicts with 0.6 m mean error [0.5, 0.7].", "gain"
             ),
-            AnswerSentence("The error grows with the horizon, least for compensated models.", "horizon"),
+            AnswerSentence("Errors grow to 3 m at the horizon, least for compensated models.", "horizon"),
             AnswerSentence("These data say nothing about waves."),
         ],
         findings=[
