@@ -17,9 +17,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.exchange.cells import read_cell_table
 from shipid.exchange.cost import Ways, errors_in_use
-from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law
+from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law, read_cell_table
 from shipid.study.schema import Cost
 
 Array = NDArray[np.float64]

@@ -21,7 +21,6 @@ from pictures import IMAGES, svg
 from scipy.stats import t as student
 
 from shipid import read_results
-from shipid.exchange.cells import read_cell_table
 from shipid.exchange.expect import study_cells
 from shipid.exchange.law import (
     FLAWS,
@@ -35,6 +34,7 @@ from shipid.exchange.law import (
     feature_columns,
     fit_hierarchy,
     fit_law,
+    read_cell_table,
     response_rows,
     response_values,
     save_law,

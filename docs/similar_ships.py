@@ -26,10 +26,9 @@ from shipid.data.dataset import read_dataset, write_dataset
 from shipid.errors import DivergenceError
 from shipid.metrics import position_error
 from shipid.study.cells import evaluate_cell, fit_method, work_of
-from shipid.study.new import draft_study, proposed_horizon
+from shipid.study.new import draft_study, proposed_horizon, survey_dataset
 from shipid.study.plan import build_plan
 from shipid.study.prepare import obtain_runs, prepare, runs_by_amount
-from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.similar import read_ships, similar_vessels, vessel_particulars
 from shipid.vessel.stability import service_shaft

@@ -30,8 +30,7 @@ from shipid.errors import DataError, ResultError, ShipidError, suggest_name
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrate_bands
-from shipid.hybrid.deployed import DeployedMethod, reason_of_no_band
-from shipid.hybrid.mean import MeanCorrector
+from shipid.hybrid.mean import DeployedMethod, MeanCorrector, reason_of_no_band
 from shipid.hybrid.method import Case, Index, Method, Task, fault_of_corrector, fit_all, name_of_class, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.novelty import NoveltyAlarm, alarm_inputs, calibrate_alarm

@@ -23,9 +23,9 @@ from shipid.report.methods import MethodsContent, sentences_on_methods, write_co
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
 from shipid.study.envelope import envelope_table
-from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, model_label, plan_text, run_command, verdict_method
 from shipid.study.results import Results, read_results
+from shipid.study.seals import PAGES, sole_writer
 
 Say = Callable[[str], object]
 REPAIR_COLUMNS = ["kind", "column", "count", "note"]

@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.errors import ShipidError
-from shipid.exchange.cells import CELL_KINDS
-from shipid.exchange.law import ExchangeLaw, Physics, UnseenShip
+from shipid.exchange.law import CELL_KINDS, ExchangeLaw, Physics, UnseenShip
 from shipid.metrics import error_of_windows, position_error
 from shipid.simulation.approach import vessel_service_speed
 from shipid.study.declared import NO_MODEL

@@ -7,9 +7,8 @@ import json
 import numpy as np
 
 from shipid.data.dataset import PAUSE_STEPS, SHORTEST_STEP_GROWTH
-from shipid.export.band import BAND_CHOICE
 from shipid.export.c import SourceFiles, Wrapper, array_of, source_files
-from shipid.export.model import ExportModel
+from shipid.export.model import BAND_CHOICE, ExportModel
 from shipid.export.recorder import KEPT_ENTRIES, filters_of, recorder_functions
 from shipid.observer import MOST_FILTER_STEPS, STEP_SLACK, filter_state_sizes
 from shipid.version import __version__

@@ -22,13 +22,12 @@ from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
 from shipid.engine.native import find_compiler
 from shipid.errors import ShipidError, escape_unprintable
-from shipid.export.band import BAND_CHOICE, BAND_ROWS
 from shipid.export.c import SourceFiles, number_list
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
 from shipid.export.equations import Equations
 from shipid.export.fmu_c import FMI_BODY, FMI_HEAD, PREDICTOR_MODEL, VESSEL_MODEL
-from shipid.export.model import ExportModel
+from shipid.export.model import BAND_CHOICE, BAND_ROWS, ExportModel
 from shipid.files import replace_whole
 from shipid.physics.signals import ACTUAL, SIGNALS, neutral_value
 from shipid.version import __version__

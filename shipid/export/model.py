@@ -1,8 +1,9 @@
-"""A predictor as one CasADi function, with the names, units and limits of what goes in and comes out."""
+"""A predictor as one CasADi function, with the names, units and limits of what goes in and comes out; its band."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,15 +12,23 @@ import numpy as np
 from casadi import MX
 
 from shipid.errors import ShipidError
-from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_band_promised
-from shipid.export.correctors import symbolic_corrector
 from shipid.export.equations import function_by_names, symbols_of
-from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs, change_arrays, symbolic_physics
-from shipid.hybrid.deployed import DeployedMethod
+from shipid.export.known import (
+    POSITION_ENTRIES,
+    InputLayout,
+    NamedExpressions,
+    PredictorInputs,
+    change_arrays,
+    symbolic_physics,
+)
+from shipid.hybrid.bands import FEWEST, LEVELS, Bands, track_directions
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.mean import MeanCorrector
-from shipid.hybrid.method import widen_range
+from shipid.hybrid.forest import ForestCorrector, Trees
+from shipid.hybrid.kernel_compensator import KernelCompensator
+from shipid.hybrid.mean import DeployedMethod, MeanCorrector
+from shipid.hybrid.method import Corrector, widen_range
 from shipid.hybrid.methods import METHODS
+from shipid.hybrid.modules import Alarm, ModulesCorrector
 from shipid.hybrid.novelty import alarm_inputs
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.simulated import SimulatedPhysics
@@ -28,6 +37,137 @@ from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
 from shipid.users import error_location, is_user_code, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
+
+Array = np.ndarray
+
+
+def symbolic_corrector(corrector: Corrector) -> Corrector:
+    """The same corrector, which also predicts from symbols."""
+    if isinstance(corrector, ForestCorrector):
+        return replace(corrector, trees=SymbolicTrees(**vars(corrector.trees)))
+    if isinstance(corrector, ModulesCorrector):
+        return replace(corrector, alarm=SymbolicAlarm(**vars(corrector.alarm)))
+    if isinstance(corrector, KernelCompensator):  # else the centres over the scales of each member were written out
+        members = tuple(replace(one, scales=_symbolic_constant(one.scales)) for one in corrector.members)
+        return replace(corrector, centres=_symbolic_constant(corrector.centres), members=members)
+    return corrector
+
+
+def _symbolic_constant(values: Array) -> Any:
+    """Numbers that CasADi keeps apart from what is computed with them."""
+    return ca.ArrayInterface.MX(MX(ca.DM(values)), shape=values.shape)
+
+
+class SymbolicTrees(Trees):
+    """Trees of symbols; all go down together, a level at a time.
+
+    Nodes are numbered anew, those of leaves last. Python compares inputs in single precision: a threshold becomes the
+    greatest number in double precision that goes left.
+    """
+
+    def predict(self, inputs: Any) -> Any:
+        """Mean of the leaves that inputs (1, d) come to, (1, outputs)."""
+        seen, leaf = MX(inputs).T, np.asarray(self.left < 0)
+        inner = int((~leaf).sum())
+        number = np.where(leaf, inner + np.cumsum(leaf) - 1, np.cumsum(~leaf) - 1)
+        node = MX(ca.DM(number[self.first]))
+        if inner:
+            children = ca.DM(number[np.stack([self.left, self.right], axis=1)[~leaf]].ravel())
+            feature, threshold = ca.DM(self.feature[~leaf]), ca.DM(greatest_left(self.threshold[~leaf]))
+        for _ in range(depth_of(self)):
+            at = ca.fmin(node, inner - 1)
+            right = seen[MX(feature)[at]] > MX(threshold)[at]
+            node = ca.if_else(node >= inner, node, MX(children)[2 * at + right])
+        outputs, values = self.value.shape[1], MX(ca.DM(self.value[leaf].ravel()))
+        places = ca.repmat((node - inner).T * outputs, outputs, 1)
+        places += ca.repmat(ca.DM(range(outputs)), 1, len(self.first))
+        leaves = ca.reshape(values[ca.vec(places)], outputs, len(self.first))
+        return ca.ArrayInterface(ca.sum2(leaves).T / len(self.first))
+
+
+def depth_of(trees: Trees) -> int:
+    """Number of comparisons from the roots to the deepest leaf."""
+    level, depth = trees.first[trees.left[trees.first] >= 0], 0
+    while level.size:
+        level = np.concatenate([trees.left[level], trees.right[level]])
+        level, depth = level[trees.left[level] >= 0], depth + 1
+    return depth
+
+
+def greatest_left(threshold: Array) -> Array:
+    """The greatest x in double precision whose rounding to single precision is at most the threshold.
+
+    Between f, the greatest single at most the threshold, and the next one lies their middle, which rounds to the even.
+    """
+    low = threshold.astype(np.float32)
+    low = np.where(low > threshold, np.nextafter(low, np.float32(-np.inf)), low)
+    middle = (low.astype(float) + np.nextafter(low, np.float32(np.inf)).astype(float)) / 2
+    return np.asarray(np.where(middle.astype(np.float32) == low, middle, np.nextafter(middle, -np.inf)))
+
+
+class SymbolicAlarm(Alarm):
+    """Distances of symbols."""
+
+    def away(self, z: Any) -> Any:
+        """Distance (1,) of normalised inputs (1, d) to the nearest centre."""
+        return ca.ArrayInterface.MX(distance_to_nearest(MX(z).T, self.centres), shape=(1,))
+
+
+def distance_to_nearest(point: MX, centres: Array) -> MX:
+    """Distance of a point (d,) to the nearest of some centres (C, d); a slope of 0 at a centre."""
+    apart = ca.DM(centres.T) - ca.repmat(point, 1, len(centres))
+    least = ca.mmin(ca.sum1(apart**2))
+    return ca.if_else(least == 0, 0, ca.sqrt(ca.if_else(least == 0, 1, least)))
+
+
+BAND_CHOICE = ("level", "pointwise", "kind")
+"""Inputs of a band: its level, whether each step is taken alone (0 or 1), the kind of manoeuvre (0: any)."""
+BAND_ROWS = ("along", "across", "ahead_x", "ahead_y")
+"""Rows of a band: half axes [m], and the unit vector of the track in body axes; a column for each step."""
+
+
+def half_axes_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
+    """Half axes (T, 2) of a band before it grows: radius, linear between `LEVELS`, times scale.
+
+    Each table has a weight of 1 at its place.
+    """
+    whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])
+    near = ca.fmax(0, 1 - ca.fabs(100 * level - ca.DM(100 * LEVELS)))
+    of = ca.fmax(0, 1 - ca.fabs(kind - ca.DM(range(len(whole)))))
+    radius = ca.dot(of, ca.mtimes(ca.DM(whole), near))
+    radii = ca.if_else(pointwise != 0, ca.mtimes(ca.DM(bands.steps.T), near), ca.repmat(radius, len(bands.along), 1))
+    scales = np.concatenate([np.stack([bands.along, bands.across], axis=1)[None], bands.scales])
+    return ca.horzcat(*(ca.mtimes(ca.DM(scales[..., side].T), of) * radii for side in (0, 1)))
+
+
+def band_rows(
+    bands: Bands, now: NamedExpressions, path: MX, step: float, half: MX, past: Mapping[str, Any] | None = None
+) -> MX:
+    """Rows (4, T) of `BAND_ROWS` around a path (2, T) of steps [s]; half axes (T, 2), rows of the past."""
+    columns: dict[str, Any] = {name: ca.ArrayInterface.MX(now[name], shape=(1,)) for name in (*MOTIONS, *bands.names)}
+    paths: Any = ca.ArrayInterface.MX(path.T, shape=(path.shape[1], 1, 2))
+    grown = MX(SymbolicBands(**vars(bands)).growth(paths, columns, step, past))
+    ahead: Any = track_directions(paths)
+    return ca.vertcat(grown * half.T, MX(ahead.reshape(path.shape[1], 2)).T)
+
+
+class SymbolicBands(Bands):
+    """Bands of symbols."""
+
+    def away(self, points: Any) -> Any:
+        """Distance (1,) of points (1, d) from the windows of training."""
+        nearest = distance_to_nearest(MX(points / self.spread).T, self.centres / self.spread)
+        return ca.ArrayInterface.MX(nearest / np.sqrt(self.centres.shape[1]), shape=(1,))
+
+
+def is_band_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
+    """Whether enough runs calibrated the level, or the kind, as `Bands.check`."""
+    counts = ca.DM([bands.runs, *bands.kinds.values()])
+    runs = ca.dot(counts, kind == ca.DM(range(len(bands.kinds) + 1)))
+    promised = ca.logic_and(ca.logic_and(level > 0, level <= float(LEVELS[-1])), runs >= FEWEST)
+    promised = ca.logic_and(promised, level / (1 - level) - 1e-9 <= runs)
+    return ca.logic_and(promised, ca.logic_not(ca.logic_and(pointwise != 0, kind != 0)))
+
 
 UNITS_OF_FORCES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
 """Slow force of the observer over the mass -> unit; its other estimates are velocities."""
@@ -51,7 +191,7 @@ class ExportModel:
         """The inputs of `InputLayout.sizes` and a choice of a band -> path, outside, band, promised.
 
         path : (2, T) x and y [m] in body axes at the instant. outside : 1 for the alarm. band : (4, T), see
-        `shipid.export.band.BAND_ROWS`; where `promised` is 0 it is not a number. The choice of a band and the last two
+        `shipid.export.model.BAND_ROWS`; where `promised` is 0 it is not a number. The choice of a band and the last two
         outputs are there where the predictor has bands; a band has no derivative.
 
         `predict` of the method itself runs on symbols. ShipidError for a mean, for networks of PyTorch, for a method

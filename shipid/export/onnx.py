@@ -12,7 +12,7 @@ from shipid.errors import ShipidError
 from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator, Layers, Normaliser
-from shipid.hybrid.deployed import DeployedMethod
+from shipid.hybrid.mean import DeployedMethod
 from shipid.hybrid.method import Array
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.units import Units

@@ -1,26 +1,89 @@
-"""Write a predictor or a vessel as files for others."""
+"""Write a predictor or a vessel as files for others.
+
+As CasADi files here: a `casadi.Function`, with a list of names in a second file.
+"""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
+
+import casadi as ca
 
 from shipid.arguments import as_path, check_choice, check_class
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, suggest_name
-from shipid.export.c import SourceFiles, c_name
+from shipid.export.c import SourceFiles, c_name, rename_function
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
-from shipid.export.casadi import write_predictor_function, write_vessel_function
+from shipid.export.equations import Equations, step_function
 from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
-from shipid.export.model import ExportModel, build_model
+from shipid.export.model import BAND_CHOICE, BAND_ROWS, ExportModel, build_model
 from shipid.export.onnx import write_onnx
-from shipid.files import write_set
-from shipid.hybrid.deployed import DeployedMethod
+from shipid.files import json_text, write_set
+from shipid.hybrid.mean import DeployedMethod
+from shipid.version import __version__
 from shipid.vessel.load import Vessel
+
+
+def write_vessel_function(vessel: Vessel, name: str, method: Method, file: Path) -> list[Path]:
+    """Write (carry, commands, environment, loads, parameters, dt) -> carry after dt."""
+    equations = Equations(vessel)
+    described = {
+        "what": f"one step of {vessel.name} by {method}",
+        "defaults": {"parameters": list(vessel.parameters.values())},
+    }
+    inputs, outputs = {**equations.groups, "dt": {"dt": "s"}}, {"after": equations.groups["carry"]}
+    return _write_function(step_function(equations.model, method), name, file, described, inputs, outputs)
+
+
+def write_predictor_function(model: ExportModel, name: str, file: Path) -> list[Path]:
+    """Write `ExportModel.function`."""
+    names, bands = model.layout, model.predictor.bands
+    inputs = {group: model.units(group) for group in names.sizes}
+    outputs = {"path": {"x": "m", "y": "m"}, "outside": {"outside": "-"}}
+    described: dict[str, Any] = {
+        "what": f"path after 1 ... {names.horizon} steps of {model.physics.step:g} s, method {model.predictor.method}",
+        "rows": {"past": names.num_past, "planned": names.horizon},
+        "limits": model.limits,
+        "provenance": dict(model.predictor.provenance),
+    }
+    if names.physics:
+        described["rows"]["physics"] = names.horizon
+    if bands is not None:
+        inputs |= {key: {key: "-"} for key in BAND_CHOICE}
+        outputs |= {"band": dict(zip(BAND_ROWS, "mm--", strict=True)), "promised": {"promised": "-"}}
+        described["runs"] = bands.runs
+        described["kinds"] = {kind: [number, count] for number, (kind, count) in enumerate(bands.kinds.items(), 1)}
+    return _write_function(model.function, name, file, described, inputs, outputs)
+
+
+def _write_function(
+    function: ca.Function,
+    name: str,
+    file: Path,
+    described: dict[str, Any],
+    inputs: Mapping[str, Mapping[str, str]],
+    outputs: Mapping[str, Mapping[str, str]],
+) -> list[Path]:
+    """Write a file for `casadi.Function.load`, and beside it a `.json` of the entries and units of inputs and outputs.
+
+    Both are on the disk before those of an earlier export are replaced. Raises OSError.
+    """
+    packed = ca.StringSerializer()  # `Function.save` does not say where a disk is full
+    packed.pack(rename_function(function, name))
+    for key, groups in (("inputs", inputs), ("outputs", outputs)):
+        described[key] = {
+            group: [{"name": entry, "unit": unit} for entry, unit in units.items()] for group, units in groups.items()
+        }
+    plain = json.loads(json.dumps(described, default=str))
+    listing = {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **plain}
+    return write_set({file: packed.encode(), file.with_name(file.name + ".json"): json_text(listing)})
+
 
 EXAMPLE_FILE = "main.c"
 

@@ -7,9 +7,9 @@ line that a killed process left half written is cut off when the file is opened 
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from shipid.errors import ResultError
@@ -19,19 +19,21 @@ REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
 class Journal:
-    """Searches on disk, by cell; one process writes them.
+    """Searches by cell, and what writes them down; one process writes those of a file.
 
     Parameters
     ----------
-    file : the journal; made where there is none. ResultError where it is not one, or not as it was written.
-    check : called before each write; what it raises, where this process may not write any more, ends the search.
+    content : lines that are there already. ResultError where they are none, or not as they were written.
+    write : called with further lines, whole ones. What it raises ends the search.
     study : digest of the plan that the searches belong to: those of another are refused. Empty for any.
+    file : where the lines are, for messages.
     """
 
-    def __init__(self, file: Path, check: Callable[[], object] = lambda: None, study: str = "") -> None:
-        self.file, self.check, self.digest = file, check, study
+    def __init__(
+        self, content: bytes, write: Callable[[bytes], object], study: str = "", file: Path | None = None
+    ) -> None:
+        self.write, self.digest = write, study
         self._entries: dict[str, list[Row | int]] = {}
-        content = file.read_bytes() if file.exists() else b""
         try:
             entries = read_entries(content)
         except ValueError:
@@ -40,8 +42,6 @@ class Journal:
             if study and digest != study:
                 raise ResultError(f"the trials of {cell} are of another study; {REMEDY}", file=file)
             self._entries.setdefault(cell, []).append(entry)
-        if content and not content.endswith(b"\n"):
-            os.truncate(file, content.rfind(b"\n") + 1)
 
     def rows(self, cell: str) -> list[Row]:
         """Return the trials of a search that ended, in order, each once."""
@@ -57,13 +57,37 @@ class Journal:
 
     def add(self, entries: Mapping[str, Sequence[Row | int]]) -> None:
         """Append to searches: cell -> trials, each with the next number, or how many there will be."""
-        self.check()
-        with open(self.file, "ab") as stream:
-            for cell, several in entries.items():
-                self._entries.setdefault(cell, []).extend(several)
-                for entry in several:
-                    text = json.dumps([self.digest, cell, entry]).encode()
-                    stream.write(b"%08x %b\n" % (zlib.crc32(text), text))
+        lines = []
+        for cell, several in entries.items():
+            self._entries.setdefault(cell, []).extend(several)
+            for entry in several:
+                text = json.dumps([self.digest, cell, entry]).encode()
+                lines.append(b"%08x %b\n" % (zlib.crc32(text), text))
+        self.write(b"".join(lines))
+
+
+def open_journal(file: Path, check: Callable[[], object] = lambda: None, study: str = "") -> Journal:
+    """A journal in a file, which is made where there is none; a last line that is not whole is cut off.
+
+    check : called before each write; what it raises, where this process may not write any more, ends the search.
+    """
+    return Journal(whole_lines(file), partial(append_lines, file, check), study, file)
+
+
+def whole_lines(file: Path) -> bytes:
+    """Lines of a journal, none where there is no file; a last one that is not whole is cut off it."""
+    content = file.read_bytes() if file.exists() else b""
+    whole = content[: content.rfind(b"\n") + 1]
+    if whole != content:
+        file.write_bytes(whole)
+    return whole
+
+
+def append_lines(file: Path, check: Callable[[], object], lines: bytes) -> None:
+    """Append lines to a journal, if a check lets them."""
+    check()
+    with open(file, "ab") as stream:
+        stream.write(lines)
 
 
 def read_entries(content: bytes) -> list[tuple[str, str, Row | int]]:

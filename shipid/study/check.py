@@ -9,9 +9,8 @@ from pathlib import Path
 
 from shipid.hybrid.journal import read_entries
 from shipid.study import seals, store
-from shipid.study.lock import has_writer
 from shipid.study.plan import WITH, Plan
-from shipid.study.seals import Fault
+from shipid.study.seals import Fault, has_writer
 from shipid.units import plural_word
 
 

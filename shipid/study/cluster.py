@@ -6,18 +6,15 @@ Workers do not touch the folder of the run: what a search writes is also sent to
 from __future__ import annotations
 
 import logging
-import pickle
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Row
 from shipid.plugins import TRIED_FILES, import_files
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
@@ -37,28 +34,15 @@ Result = TypeVar("Result")
 log = logging.getLogger(__name__)
 
 
-class SentJournal(Journal):
-    """The journal of a unit on a worker of a cluster, in a file there; all that is added to it is sent, too.
+def journal_by_topic(content: bytes, study: str, topic: str) -> Journal:
+    """The journal of a task on a worker: what is added to it is sent by a topic of the scheduler.
 
-    content : of the journal in the folder of the run; what a worker that died has sent since is added.
-    topic : of the scheduler, by which the process that gave the unit receives what is added.
+    content : of its file in the folder of the run; what a worker that died has sent since is added.
     """
+    from dask.distributed import get_client, get_worker
 
-    def __init__(self, file: Path, content: bytes, digest: str, topic: str) -> None:
-        from dask.distributed import get_client
-
-        file.write_bytes(content)
-        super().__init__(file, study=digest)
-        for _, message in get_client().get_events(topic):
-            super().add(pickle.loads(message))
-        self.topic = topic
-
-    def add(self, entries: Mapping[str, Sequence[Row | int]]) -> None:
-        """Append to searches, and send it."""
-        from dask.distributed import get_worker
-
-        super().add(entries)
-        get_worker().log_event(self.topic, pickle.dumps(entries))
+    sent = (lines for _, lines in get_client().get_events(topic))
+    return Journal(content + b"".join(sent), partial(get_worker().log_event, topic), study)
 
 
 def on_dask(
@@ -144,7 +128,7 @@ def _results(
                 lonely = _has_no_workers(client, lonely)
                 continue
             if isinstance(future, bytes):
-                receive(key, pickle.loads(future))
+                receive(key, future)
                 continue
             task, _ = left.pop(key)
             try:

@@ -13,10 +13,9 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -29,8 +28,7 @@ from shipid.engine.native import engine_description, noted_engine
 from shipid.errors import ResultError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
-from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Row
+from shipid.hybrid.journal import append_lines, open_journal, whole_lines
 from shipid.hybrid.method import TrialJournal as Searches
 from shipid.plugins import REGISTRIES, add_members, added_members
 from shipid.study import seals, store
@@ -43,9 +41,8 @@ from shipid.study.cells import (
     fit_method,
     work_of,
 )
-from shipid.study.cluster import SentJournal, on_dask
+from shipid.study.cluster import journal_by_topic, on_dask
 from shipid.study.envelope import input_envelope
-from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
 from shipid.study.prepare import (
     PreparedStudy,
@@ -55,6 +52,7 @@ from shipid.study.prepare import (
     regression_paths,
     runs_by_amount,
 )
+from shipid.study.seals import PAGES, sole_writer
 from shipid.study.workers import import_for_workers, on_workers
 from shipid.users import code_digest
 from shipid.version import __version__
@@ -252,21 +250,20 @@ def _compute(
     plan: Plan, prepared: PreparedStudy, units: Iterable[Unit], place: Path, begun: dict[str, Any], means: Means
 ) -> Computed:
     """Units and their results in the order in which they finish; what they were computed with is noted before."""
-    journals = partial(open_journal, place.absolute() / store.JOURNALS, plan.digest)
-    make_folder(place / store.JOURNALS)
+    folder, check = place.absolute() / store.JOURNALS, partial(store.check_place, place.absolute(), plan.digest)
+    make_folder(folder)
     if means.scheduler is None:
-        work = partial(_on_pool, plan, prepared, journals, begun)
+        work = partial(_on_pool, plan, prepared, folder, check, begun)
         for unit, (session, results) in on_workers(
             work, units, usable_cores() if means.workers is None else means.workers
         ):
             note_sessions(place, session)
             yield unit, results
         return
-    writer, kept = cache(journals), {file.stem: file.read_bytes() for file in (place / store.JOURNALS).glob("*.log")}
-    tasks = [(unit.key, (unit, kept.get(unit.key, b""))) for unit in units]
+    tasks = [(unit.key, (unit, whole_lines(folder / f"{unit.key}.log"))) for unit in units]
 
-    def write(key: str, entries: Mapping[str, Sequence[Row | int]]) -> None:
-        writer(key).add(entries)
+    def write(key: str, lines: bytes) -> None:
+        append_lines(folder / f"{key}.log", check, lines)
 
     shared = plan, prepared, means.device, own_code(plan), added_members()
     for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, write):
@@ -274,17 +271,13 @@ def _compute(
         yield unit, results
 
 
-def open_journal(folder: Path, digest: str, unit: str) -> Journal:
-    """The journal of the searches of a unit, in the folder of journals of a study of this digest."""
-    return Journal(folder / f"{unit}.log", partial(store.check_place, folder.parent, digest), digest)
-
-
 def _on_pool(
-    plan: Plan, prepared: PreparedStudy, journals: Callable[[str], Journal], begun: dict[str, Any], unit: Unit
+    plan: Plan, prepared: PreparedStudy, folder: Path, check: Callable[[], object], begun: dict[str, Any], unit: Unit
 ) -> tuple[dict[str, Any], list[store.Cell]]:
     """A unit on a worker of this machine: what it was computed with, and the results."""
     session = {**begun, **code_at_worker(plan, {})}
-    results = run_unit(plan, prepared, unit, begun["device"], journals(unit.key))
+    journal = open_journal(folder / f"{unit.key}.log", check, plan.digest)
+    results = run_unit(plan, prepared, unit, begun["device"], journal)
     return session_by_now(session), results
 
 
@@ -295,9 +288,7 @@ def _on_cluster(
     (plan, prepared, device, code, members), (unit, journal) = shared, task
     add_members(members)
     session = session_on(device, code_at_worker(plan, code))
-    with TemporaryDirectory() as folder:
-        sent = SentJournal(Path(folder) / f"{unit.key}.log", journal, plan.digest, topic)
-        results = run_unit(plan, prepared, unit, device, sent)
+    results = run_unit(plan, prepared, unit, device, journal_by_topic(journal, plan.digest, topic))
     return [session, {**session, "engine": engine_description()}], results
 
 

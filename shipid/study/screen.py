@@ -21,10 +21,9 @@ from shipid.errors import DocumentError, suggest_name
 from shipid.evidence import SIGNIFICANT, holm_correction
 from shipid.hybrid.physics import Physics, check_columns
 from shipid.metrics import BINS, position_error, rank_correlation, summarise_errors, tally_quantile
-from shipid.study.new import proposed_horizon
+from shipid.study.new import proposed_horizon, survey_dataset
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of, window_memory
-from shipid.study.survey import survey_dataset
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, change_structure, draw_members
 

@@ -1,17 +1,22 @@
-"""Digests of the files in a folder of results, so that what was changed is never taken for a result.
+"""Folders of results: one writer, and digests of their files, so that what was changed is never taken for a result.
 
 `seals/NAME.sha256` holds a comment with the digest of the study and a line per file, as the tool `sha256sum` writes: in
 the folder of a run, `sha256sum -c seals/*` checks it too. A unit of work counts as done when its seal is there, which
-is written last.
+is written last. The lock of the writer is the operating system's: it ends with its process, whatever ends that.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
+import logging
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from shipid.errors import ResultError
 from shipid.files import write_text
@@ -151,3 +156,43 @@ def study_digest(folder: Path) -> str | None:
         return str(json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["digest"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+WRITER, PAGES = "writer", "pages"  # locks: on all that a run computes, and on its tables and pages
+NO_LOCKS = (errno.ENOSYS, errno.ENOTSUP, errno.ENOLCK)  # what a file system says that has none
+
+log = logging.getLogger(__name__)
+
+
+@contextmanager
+def sole_writer(folder: Path, name: str = WRITER, *, wait: bool = False) -> Iterator[None]:
+    """Keep other processes out of a folder, or wait until they have left it.
+
+    Where the file system has no locks there is a warning, and nobody is kept out.
+
+    Raises ResultError where another process is in the folder.
+    """
+    lock = FileLock(folder / f".{name}.lock", blocking=wait, fallback_to_soft=False)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise ResultError("another process works in it: wait until it has ended, or end it", file=folder) from None
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+        log.warning("%s is on a file system without locks: let one process at a time work in it", folder)
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def has_writer(folder: Path) -> bool:
+    """Whether a process works in a folder; False where the folder cannot be locked, such as one that is read only."""
+    try:
+        with FileLock(folder / f".{WRITER}.lock", blocking=False, fallback_to_soft=False):
+            return False
+    except Timeout:
+        return True
+    except OSError:
+        return False

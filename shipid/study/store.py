@@ -41,8 +41,8 @@ from shipid.foundations.predictions import PredictionTable
 from shipid.hybrid.search import SearchMethod
 from shipid.predictor import Predictor
 from shipid.study import seals
-from shipid.study.lock import sole_writer
 from shipid.study.plan import FUNCTION_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
+from shipid.study.seals import sole_writer
 from shipid.version import __version__
 from shipid.vessel.load import check_document
 

@@ -46,8 +46,7 @@ from shipid.identification.statistics import LEVEL, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import MeasuredManoeuvre
-from shipid.study.new import proposed_horizon
-from shipid.study.survey import survey_dataset
+from shipid.study.new import proposed_horizon, survey_dataset
 from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import UNUSUAL, find_contradictions

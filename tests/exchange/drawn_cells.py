@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from shipid.exchange.cells import CELL_COLUMNS
-from shipid.exchange.law import FLOOR_CENTRE, RESPONSES, Hierarchy
+from shipid.exchange.law import CELL_COLUMNS, FLOOR_CENTRE, RESPONSES, Hierarchy
 from shipid.units import GRAVITY
 
 KINDS = ("nominal", *["damping", "mass", "thrust", "missing", "moderate", "high"] * 2, "template", "sister", "none")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.exchange.cells import check_cells, read_cell_table
+from shipid.exchange.law import check_cells, read_cell_table
 from tests.exchange.drawn_cells import draw_cells
 
 

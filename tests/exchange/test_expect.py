@@ -11,8 +11,7 @@ import pytest
 from shipid import read_results
 from shipid.errors import ShipidError
 from shipid.exchange import expect
-from shipid.exchange.cells import CELL_COLUMNS, check_cells
-from shipid.exchange.law import UnseenShip, fit_law
+from shipid.exchange.law import CELL_COLUMNS, UnseenShip, check_cells, fit_law
 from tests.exchange.drawn_cells import draw_cells
 
 SHIP = UnseenShip(100.0, 7.0, baseline=50.0, floor=12.0)

@@ -16,7 +16,7 @@ from shipid.data.windows import Instants
 from shipid.export.c import SourceFiles
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import ExportModel, build_model
-from shipid.hybrid.deployed import DeployedMethod
+from shipid.hybrid.mean import DeployedMethod
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")

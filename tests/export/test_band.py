@@ -10,9 +10,8 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at
 from shipid.export.c_predictor import predictor_files
-from shipid.export.model import build_model
+from shipid.export.model import BAND_CHOICE, band_rows, build_model, half_axes_at
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.bands import Region
 from shipid.hybrid.features import NO_MEMORY, Inputs

@@ -32,9 +32,9 @@ from shipid.files import TEMPORARY
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.check import check_folder
-from shipid.study.lock import has_writer
 from shipid.study.results import read_results
 from shipid.study.run import prepare_study, run_study
+from shipid.study.seals import has_writer
 from tests.faults.trials import PATIENCE, Failure
 from tests.study.tiny import run_here as run_in_process
 from tests.study.tiny import tiny_plan, without_workers

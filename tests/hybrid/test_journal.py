@@ -14,7 +14,7 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
 from shipid.errors import ResultError
-from shipid.hybrid.journal import Journal
+from shipid.hybrid.journal import open_journal
 from shipid.hybrid.trials import write_searches
 
 SPACE: dict[str, Any] = {
@@ -45,30 +45,30 @@ def rows(count: int, seed: int = 0, first: int = 0) -> list[dict[str, Any]]:
 
 def test_trials_come_back_to_the_digit(tmp_path: Path) -> None:
     written = {"a+drawn-N0010-s0": rows(9, 1), "b": rows(4, 101), "c": []}
-    Journal(tmp_path / "t.log").add(written)
-    read = Journal(tmp_path / "t.log")
+    open_journal(tmp_path / "t.log").add(written)
+    read = open_journal(tmp_path / "t.log")
     for cell, mine in written.items():
         assert repr(read.rows(cell)) == repr(mine)
     read.add({"b": rows(3, 1, first=4)})
-    assert repr(Journal(tmp_path / "t.log").rows("b")) == repr(written["b"] + rows(3, 1, first=4))
-    assert Journal(tmp_path / "t.log").rows("unknown") == []
+    assert repr(open_journal(tmp_path / "t.log").rows("b")) == repr(written["b"] + rows(3, 1, first=4))
+    assert open_journal(tmp_path / "t.log").rows("unknown") == []
 
 
 def test_a_journal_of_another_study_is_refused(tmp_path: Path) -> None:
     """Where folders were merged, an interrupted search went on with trials of another world, without a word."""
     file = tmp_path / "t.log"
-    Journal(file, study="one").add({"a": rows(3, 1)})
-    assert len(Journal(file, study="one").rows("a")) == len(Journal(file).rows("a")) == 3
+    open_journal(file, study="one").add({"a": rows(3, 1)})
+    assert len(open_journal(file, study="one").rows("a")) == len(open_journal(file).rows("a")) == 3
     with pytest.raises(ResultError, match=r"t\.log: the trials of a are of another study; take the journal away"):
-        Journal(file, study="other").rows("a")
+        open_journal(file, study="other").rows("a")
 
 
 def test_a_trial_that_comes_twice_counts_once(tmp_path: Path) -> None:
     """Two workers of a cluster of which one was thought dead."""
-    journal = Journal(tmp_path / "t.log")
+    journal = open_journal(tmp_path / "t.log")
     for first, count in ((0, 2), (1, 1), (2, 2)):
         journal.add({"a": rows(5, 1)[first : first + count]})
-    assert repr(Journal(tmp_path / "t.log").rows("a")) == repr(rows(5, 1)[:4])
+    assert repr(open_journal(tmp_path / "t.log").rows("a")) == repr(rows(5, 1)[:4])
 
 
 def test_optuna_opens_the_file_as_it_is(tmp_path: Path) -> None:
@@ -89,18 +89,18 @@ def test_optuna_opens_the_file_as_it_is(tmp_path: Path) -> None:
 def test_a_write_that_was_cut_off_anywhere_loses_its_last_trial_at_most(tmp_path: Path) -> None:
     """After each whole line and within it, the first one too: a search of a study goes on."""
     file, written = tmp_path / "t.log", rows(3, 1)
-    Journal(file, study="one").add({"a": written})
+    open_journal(file, study="one").add({"a": written})
     whole = file.read_bytes()
     ends = np.cumsum([0, *map(len, whole.splitlines(keepends=True))])
     assert len(ends) == 4
     for cut in [*ends, *(ends[1:] - 7)]:
         file.write_bytes(whole[:cut])
-        again = Journal(file, study="one")
+        again = open_journal(file, study="one")
         kept = len(again.rows("a"))
         assert kept == np.searchsorted(ends, cut, side="right") - 1
         assert repr(again.rows("a")) == repr(written[:kept])
         again.add({"a": written[kept:], "b": rows(2, 4)})
-        last = Journal(file, study="one")
+        last = open_journal(file, study="one")
         assert repr(last.rows("a")) == repr(written)
         assert repr(last.rows("b")) == repr(rows(2, 4))
 
@@ -109,7 +109,7 @@ def test_a_write_that_was_cut_off_anywhere_loses_its_last_trial_at_most(tmp_path
 def test_damage_anywhere_is_said_or_loses_trials_and_never_changes_one(tmp_path: Path, seed: int) -> None:
     """One bit, or some bytes; what is lost is added again."""
     file, written = tmp_path / "t.log", {"a": rows(5, seed), "b": rows(3, seed + 1)}
-    Journal(file).add(written)
+    open_journal(file).add(written)
     rng, content = np.random.default_rng(seed), bytearray(file.read_bytes())
     place = int(rng.integers(len(content)))
     if seed % 3 == 0:
@@ -121,7 +121,7 @@ def test_damage_anywhere_is_said_or_loses_trials_and_never_changes_one(tmp_path:
     file.write_bytes(content)
     said, read = "", dict[str, Any]()
     try:
-        journal = Journal(file)
+        journal = open_journal(file)
         read = {cell: journal.rows(cell) for cell in written}
     except ResultError as error:
         said = str(error)
@@ -131,16 +131,16 @@ def test_damage_anywhere_is_said_or_loses_trials_and_never_changes_one(tmp_path:
         mine, kept = written[cell], len(read[cell])
         assert repr(read[cell]) == repr(mine[:kept])
         journal.add({cell: mine[kept:]})
-        assert repr(Journal(file).rows(cell)) == repr(mine)
+        assert repr(open_journal(file).rows(cell)) == repr(mine)
 
 
 def test_the_number_of_trials_comes_back(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "t.log")
+    journal = open_journal(tmp_path / "t.log")
     journal.add({"a": rows(2, 1)})
     assert journal.count("a") is None
     journal.add({"a": [7], "b": [7]})
-    assert Journal(tmp_path / "t.log").count("a") == journal.count("b") == 7
-    assert repr(Journal(tmp_path / "t.log").rows("a")) == repr(rows(2, 1))
+    assert open_journal(tmp_path / "t.log").count("a") == journal.count("b") == 7
+    assert repr(open_journal(tmp_path / "t.log").rows("a")) == repr(rows(2, 1))
 
 
 def test_who_may_not_write_any_more_writes_nothing(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_who_may_not_write_any_more_writes_nothing(tmp_path: Path) -> None:
         if not held[0]:
             raise ResultError("taken over")
 
-    slow = Journal(tmp_path / "t.log", check)
+    slow = open_journal(tmp_path / "t.log", check)
     slow.add({"a": rows(2, 1)})
     held[0] = False
     before = (tmp_path / "t.log").read_bytes()
@@ -170,5 +170,5 @@ def test_a_file_that_is_no_journal_is_one_line(tmp_path: Path) -> None:
         file = tmp_path / f"{number}.log"
         file.write_bytes(content)
         with pytest.raises(ResultError, match="damaged") as caught:
-            Journal(file)
+            open_journal(file)
         assert "\n" not in str(caught.value)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.hybrid.deployed import DeployedMethod
-from shipid.hybrid.mean import MeanCorrector, weigh_errors
+from shipid.hybrid.mean import DeployedMethod, MeanCorrector, weigh_errors
 from shipid.hybrid.method import fit_all
 from shipid.predictor import Predictor
 from tests.drawn import seeds

@@ -14,7 +14,7 @@ import shipid
 from shipid.errors import ResultError
 from shipid.hybrid import network as networks
 from shipid.hybrid.features import select_inputs
-from shipid.hybrid.journal import Journal
+from shipid.hybrid.journal import Journal, open_journal
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.network import NetworkMethod
 from shipid.hybrid.recurrent import past_signals
@@ -149,8 +149,8 @@ def test_a_search_that_was_interrupted_goes_on_with_the_same_trials(tmp_path: Pa
         task = world.task(seed=5, journal=journal)
         return Gated(trials=count, epochs=2, seconds=3.0).fit(task)["physics"].trials
 
-    trials(3, Journal(tmp_path / "t.log"))
-    resumed, whole = trials(12, Journal(tmp_path / "t.log")), trials(12, None)
+    trials(3, open_journal(tmp_path / "t.log"))
+    resumed, whole = trials(12, open_journal(tmp_path / "t.log")), trials(12, None)
     assert [row["params"] for row in resumed] == [row["params"] for row in whole]
     assert Gated().varied() == ("units", "learning_rate")
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
 from shipid.hybrid import search as searches
-from shipid.hybrid.journal import Journal
+from shipid.hybrid.journal import Journal, append_lines, open_journal
 from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
@@ -51,16 +53,17 @@ class Stopped(Exception):
     pass
 
 
-class Stopping(Journal):
-    """A journal whose process dies before the write that would take it beyond so many trials."""
+def stopping(file: Path, left: int) -> Journal:
+    """A journal whose process dies before the write that would take it beyond so many."""
+    journal, writes = open_journal(file), count()
 
-    left = 0
-
-    def add(self, entries: Any) -> None:
-        if self.left <= 0:
+    def write(lines: bytes) -> None:
+        if next(writes) >= left:
             raise Stopped
-        self.left -= 1
-        super().add(entries)
+        append_lines(file, str, lines)
+
+    journal.write = write
+    return journal
 
 
 def digits(fits: Any, here: World, kind: str) -> dict[str, Any]:
@@ -92,13 +95,12 @@ def test_a_search_that_was_interrupted_ends_with_the_same_digits(
     method = longer(kind, **more)
     whole = digits(method.fit(task_in(here, kind, None)), here, kind)
     file = tmp_path / "trials.log"
-    journal = Stopping(file)
-    journal.left = after
+    journal = stopping(file, after)
     with suppress(Stopped):  # those that write once at the end have ended
         method.fit(task_in(here, kind, journal))
-    resumed = method.fit(task_in(here, kind, Journal(file)))
+    resumed = method.fit(task_in(here, kind, open_journal(file)))
     assert digits(resumed, here, kind) == whole
-    again = Journal(file)  # and the journal holds it all, each trial once
+    again = open_journal(file)  # and the journal holds it all, each trial once
     for name, cell in (("a", "a+way-N0006-s2"), ("none", "none")):
         if name in resumed:
             kept = again.rows(cell)
@@ -123,12 +125,12 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
     file = tmp_path / "trials.log"
     method = longer(kind, budget=100.0) if kind != "path-drawn" else longer(kind, budget=100.0, averaged=1)
     monkeypatch.setattr(searches, "affordable_trials", lambda *known: 2 if known[-1] else None)
-    first = method.fit(task_in(here, kind, Journal(file)))
+    first = method.fit(task_in(here, kind, open_journal(file)))
     assert {len(fit.trials) for fit in first.values()} == {2}
     monkeypatch.setattr(searches, "affordable_trials", lambda *_: 3)
-    second = method.fit(task_in(here, kind, Journal(file)))
+    second = method.fit(task_in(here, kind, open_journal(file)))
     assert digits(second, here, kind) == digits(first, here, kind)
-    assert Journal(file).count("a+way-N0006-s2") == 2
+    assert open_journal(file).count("a+way-N0006-s2") == 2
     named = longer(kind, trials=2).model_copy(update={"averaged": 1} if kind == "path-drawn" else {})
     assert digits(named.fit(task_in(here, kind, None)), here, kind) == digits(first, here, kind)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import PositiveInt
 
-from shipid.hybrid.journal import Journal
+from shipid.hybrid.journal import open_journal
 from shipid.hybrid.search import (
     Scale,
     SearchMethod,
@@ -42,6 +42,6 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
         assert np.mean([point[name] < middle for point in points]) == pytest.approx(0.5, abs=0.05)
     assert all(0.2 <= point["share"] <= 0.7 and 1 <= point["width"] <= 100 for point in points)
     rows = [trial_row(number, point, 1.0, 0.0) for number, point in enumerate(points)]
-    Journal(tmp_path / "trials.log").add({"a": rows})
-    kept = Journal(tmp_path / "trials.log").rows("a")
+    open_journal(tmp_path / "trials.log").add({"a": rows})
+    kept = open_journal(tmp_path / "trials.log").rows("a")
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]

@@ -15,7 +15,7 @@ from filelock import FileLock
 
 from shipid.errors import ResultError
 from shipid.study.check import check_folder
-from shipid.study.lock import has_writer, sole_writer
+from shipid.study.seals import has_writer, sole_writer
 from tests.study.tiny import events_here, make_run, run_here, tiny_plan
 
 
@@ -29,7 +29,7 @@ def test_a_second_writer_is_refused_in_one_line(tmp_path: Path) -> None:
 
 
 def test_a_kill_frees_the_folder(tmp_path: Path) -> None:
-    program = "import sys; from pathlib import Path; from shipid.study.lock import sole_writer\n"
+    program = "import sys; from pathlib import Path; from shipid.study.seals import sole_writer\n"
     program += "with sole_writer(Path(sys.argv[1])):\n    print('in', flush=True)\n    sys.stdin.read()\n"
     command = [sys.executable, "-c", program, str(tmp_path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:

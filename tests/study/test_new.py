@@ -34,11 +34,11 @@ from shipid.study.new import (
     horizon_of,
     proposed_horizon,
     step_of,
+    survey_dataset,
 )
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_study
-from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
 from shipid.vessel.template import Particulars, first_guess

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from shipid.files import write_json
-from shipid.hybrid.journal import Journal
+from shipid.hybrid.journal import open_journal
 from shipid.study import seals
 from shipid.study.check import search_words
 from shipid.study.store import JOURNALS, part_folder, rows_file
@@ -24,7 +24,7 @@ def test_a_search_is_followed_trial_by_trial_until_its_unit_is_finished(tmp_path
     plan, file = tiny_plan(tmp_path, {"method.0.trials": 5}), tmp_path / JOURNALS / "unit.log"
     file.parent.mkdir()
     assert search_words(plan, tmp_path) == ""
-    journal = Journal(file)
+    journal = open_journal(file)
     assert search_words(plan, tmp_path) == ""
     journal.add({ONE: [row(0, 0.25)]})
     assert search_words(plan, tmp_path) == f"{ONE}: trial 1/5"
@@ -44,5 +44,5 @@ def test_searches_of_parts_are_followed(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"method.0.trials": 5, "repeat": {"split.seed": [0, 1]}})
     file = part_folder(tmp_path, list(plan.parts)[1]) / JOURNALS / "unit.log"
     file.parent.mkdir(parents=True)
-    Journal(file).add({ONE: [row(0, 1.0)]})
+    open_journal(file).add({ONE: [row(0, 1.0)]})
     assert search_words(plan, tmp_path).startswith(f"{ONE}: trial 1/5")

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
+from shipid.study.new import Survey, separation_of_sources, survey_dataset, typical_runs
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 100.0, 0.5)
