@@ -11,10 +11,11 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from shipid.errors import ResultError
-from shipid.hybrid.method import Row
 
+Entry = dict[str, Any] | int
 REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
@@ -33,7 +34,7 @@ class Journal:
         self, content: bytes, write: Callable[[bytes], object], study: str = "", file: Path | None = None
     ) -> None:
         self.write, self.digest = write, study
-        self._entries: dict[str, list[Row | int]] = {}
+        self._entries: dict[str, list[Entry]] = {}
         try:
             entries = read_entries(content)
         except ValueError:
@@ -43,9 +44,9 @@ class Journal:
                 raise ResultError(f"the trials of {cell} are of another study; {REMEDY}", file=file)
             self._entries.setdefault(cell, []).append(entry)
 
-    def rows(self, cell: str) -> list[Row]:
+    def rows(self, cell: str) -> list[dict[str, Any]]:
         """Return the trials of a search that ended, in order, each once."""
-        rows: list[Row] = []
+        rows: list[dict[str, Any]] = []
         for entry in self._entries.get(cell, []):
             if isinstance(entry, dict) and entry["number"] == len(rows):  # not one that came twice
                 rows.append(entry)
@@ -55,7 +56,7 @@ class Journal:
         """Return how many trials the budget of a search allowed; None before that is decided."""
         return next((entry for entry in self._entries.get(cell, []) if isinstance(entry, int)), None)
 
-    def add(self, entries: Mapping[str, Sequence[Row | int]]) -> None:
+    def add(self, entries: Mapping[str, Sequence[Entry]]) -> None:
         """Append to searches: cell -> trials, each with the next number, or how many there will be."""
         lines = []
         for cell, several in entries.items():
@@ -90,7 +91,7 @@ def append_lines(file: Path, check: Callable[[], object], lines: bytes) -> None:
         stream.write(lines)
 
 
-def read_entries(content: bytes) -> list[tuple[str, str, Row | int]]:
+def read_entries(content: bytes) -> list[tuple[str, str, Entry]]:
     """Digest of the plan, cell, and trial or number of trials of each whole line; ValueError where one is damaged."""
     entries = []
     for line in content.split(b"\n")[:-1]:

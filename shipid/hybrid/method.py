@@ -18,6 +18,7 @@ from shipid.data.windows import Instants, Windows, locked_view
 from shipid.document import parse_model
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.features import NO_MEMORY, Inputs, Memory
+from shipid.hybrid.journal import Journal
 from shipid.hybrid.physics import Needs, Physics
 from shipid.users import definition_file, locate_errors
 from shipid.vessel.load import Vessel
@@ -67,20 +68,6 @@ class Case:
 
 
 Row = dict[str, Any]
-Space = Mapping[str, Any]
-
-
-class TrialJournal(Protocol):
-    """A record of searches on disk, see `shipid.hybrid.journal`."""
-
-    def rows(self, cell: str) -> list[Row]:
-        """Return the trials of a search that ended, in order."""
-
-    def count(self, cell: str) -> int | None:
-        """Return how many trials the budget of a search allowed; None before that is decided."""
-
-    def add(self, entries: Mapping[str, Sequence[Row | int]]) -> None:
-        """Append to searches: cell -> trials, each with the next number, or how many there will be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +93,7 @@ class Task:
     hidden: Mapping[str, Mapping[str, Array] | None] = field(default_factory=dict)
     estimates: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
     device: str = "cpu"
-    journal: TrialJournal | None = None
+    journal: Journal | None = None
     cells: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

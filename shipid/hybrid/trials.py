@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from shipid.files import replace_whole
-from shipid.hybrid.method import Row, Space
+from shipid.hybrid.method import Row
 
 TRIAL_STATES = {"complete": TrialState.COMPLETE, "stopped": TrialState.PRUNED, "diverged": TrialState.FAIL}
 
@@ -27,7 +27,7 @@ class _StorageLines(JournalFileBackend):
             stream.writelines(json.dumps(log, separators=(",", ":")).encode() + b"\n" for log in logs)
 
 
-def write_searches(file: Path, searches: Iterable[tuple[str, Sequence[Row], Space]]) -> None:
+def write_searches(file: Path, searches: Iterable[tuple[str, Sequence[Row], Mapping[str, Any]]]) -> None:
     """Write searches, (cell, its trials, where they were searched), as one file of Optuna; it appears whole."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     with replace_whole(file) as temporary:
@@ -37,7 +37,7 @@ def write_searches(file: Path, searches: Iterable[tuple[str, Sequence[Row], Spac
             study.add_trials([_frozen_trial(row, space) for row in rows])
 
 
-def _frozen_trial(row: Row, space: Space) -> FrozenTrial:
+def _frozen_trial(row: Row, space: Mapping[str, Any]) -> FrozenTrial:
     """A trial that ended; what is not searched stands in its row alone."""
     searched = {name: value for name, value in row["params"].items() if name in space}
     return create_trial(

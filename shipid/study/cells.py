@@ -13,8 +13,9 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, shorten_line
+from shipid.hybrid.journal import Journal
 from shipid.hybrid.mean import MeanCorrector, sum_paths, weigh_errors
-from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
+from shipid.hybrid.method import Case, Corrector, FitResult, Task, fit_all
 from shipid.metrics import (
     PREDICTION_ERRORS,
     coverage_share,
@@ -76,7 +77,7 @@ def work_of(prepared: PreparedStudy, unit: Unit, ways: tuple[StudyMethod, ...], 
     )
 
 
-def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None) -> dict[str, FitResult]:
+def fit_method(work: Work, way: StudyMethod, journal: Journal | None = None) -> dict[str, FitResult]:
     """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
     mine = {name: work.known[name] for name in way.foundations if not work.known[name].foundation.mean_of}

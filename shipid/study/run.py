@@ -28,8 +28,7 @@ from shipid.engine.native import engine_description, noted_engine
 from shipid.errors import ResultError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
-from shipid.hybrid.journal import append_lines, open_journal, whole_lines
-from shipid.hybrid.method import TrialJournal as Searches
+from shipid.hybrid.journal import Journal, append_lines, open_journal, whole_lines
 from shipid.plugins import REGISTRIES, add_members, added_members
 from shipid.study import seals, store
 from shipid.study.cells import (
@@ -168,7 +167,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
 
 
 def run_unit(
-    plan: Plan, prepared: PreparedStudy, unit: Unit, device: str, journal: Searches | None = None
+    plan: Plan, prepared: PreparedStudy, unit: Unit, device: str, journal: Journal | None = None
 ) -> list[store.Cell]:
     """All cells of one unit of work. Pure: the same on every worker. journal : in which its searches go on."""
     use_threads(1)
