@@ -70,7 +70,7 @@ from scipy.special import exprel, ndtri
 
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
-from shipid.engine.casadi import input_symbols, memory_along, summed_rates
+from shipid.engine.casadi import call_function, input_symbols, memory_along, summed_rates
 from shipid.engine.rollout import rollout_distances
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes, multiply_signs, rotate_heading
@@ -145,13 +145,17 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it."""
+    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it.
+
+    residuals : (6, W) of that log.
+    """
 
     cause: Cause
     theta: Array
     errors: Array
     left_out: Array
     motion: Motion
+    residuals: Array
 
     @property
     def counts(self) -> bool:
@@ -310,8 +314,8 @@ class _Log:
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
         return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
 
-    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: Array | None = None) -> _Fit:
-        """Fit a cause by Gauss-Newton from a size or the start of least misfit; one that lowers nothing stays."""
+    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: _Fit | None = None) -> _Fit:
+        """Fit a cause by Gauss-Newton from a fit or the start of least misfit; one that lowers nothing stays."""
         trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
@@ -323,8 +327,11 @@ class _Log:
                 z[list(cause.scaled)] *= np.exp(max(theta[0], 0.0))  # neither way makes less of an error
             return motion, z
 
-        begins = [np.zeros(len(trials)), *map(np.atleast_1d, cause.starts)] if begin is None else [begin]
-        theta, (motion, z) = min(((one, change(one)) for one in begins), key=lambda one: self.misfit(one[1][1]))
+        if begin is None:
+            starts = (np.zeros(len(trials)), *map(np.atleast_1d, cause.starts))
+            theta, motion, z = min(((one, *change(one)) for one in starts), key=lambda one: self.misfit(one[2]))
+        else:
+            theta, motion, z = begin.theta, begin.motion, begin.residuals
         J, unit = np.zeros((len(theta), *z.shape)), np.eye(len(theta))
         if cause.of_runs:  # a change of all runs at once: none feels the number of another
             unit = np.repeat(np.eye(2), len(theta) // 2, axis=1)
@@ -354,7 +361,7 @@ class _Log:
             if out.any() and not out.all():
                 step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
-        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
+        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion, z)
 
     def beyond_noise(self, errors: Array) -> float:
         """Mean error [m] of paths without what the noise of the log makes of it."""
@@ -454,13 +461,11 @@ class _VesselLog(_Log):
         names, columns = self.model.memory, motion.columns
         if self._kept is not None and all(columns[name] is self.motion.columns[name] for name in names):
             return self._kept[0]
-        reached = [
-            memory_along(self.vessel, {name: columns[name][part] for name in names}, motion.step * np.arange(count))
-            or {}
-            for part, count in ((part, part.stop - part.start) for part in motion.stretches)
-        ]
-        series = [np.concatenate([one[name] for one in reached]) for name in names]
-        return np.reshape(series, (len(series), len(columns["u"])))
+        start, stop = np.transpose([(part.start, part.stop) for part in motion.stretches])
+        steps = np.arange((stop - start).max())
+        rows, inside = np.minimum(start + steps[:, None], stop - 1), steps < (stop - start)[:, None]
+        reached = memory_along(self.vessel, {name: columns[name][rows] for name in names}, motion.step * steps) or {}
+        return np.reshape([one.T[inside] for one in reached.values()], (len(names), len(columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
         """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
@@ -473,7 +478,7 @@ class _VesselLog(_Log):
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
-        return np.array(_mapped_rates(self.model, len(at))(*self._inputs(motion, at), motion.parameters))
+        return call_function(_mapped_rates(self.model, len(at)), *self._inputs(motion, at), motion.parameters)
 
     def _inputs(self, motion: Motion, at: Steps) -> list[Array]:
         """States, actuators, commands and environment, each (., n), at n steps."""
@@ -497,7 +502,8 @@ class _VesselLog(_Log):
         for k in range(-SHORTEST, SHORTEST):
             at = np.clip(start + k, first, last)
             sway[at] = states[row, at] = v = np.clip(v, -speed[at], speed[at])
-            v = v + motion.step * np.array(rates(states[:, at], *(one[:, at] for one in inputs), motion.parameters))[1]
+            now = (one[:, at] for one in (states, *inputs))
+            v = v + motion.step * call_function(rates, *now, motion.parameters)[1]
         drift = np.arcsin(sway / np.maximum(speed, 1e-12)) * np.sign(motion.columns["u"])
         return rotate_heading(replace(motion, course=False), [drift])
 
@@ -664,7 +670,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     base = log.plain_residuals
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
-    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
+    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key]) for key in near}
     rest = min(log.misfit(z) for z in (base, *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
     fits |= {
         key: replace(fit, cause=replace(fit.cause, cost=np.inf))
