@@ -19,6 +19,18 @@ from shipid.vessel.load import Vessel
 BLOCK, UNROLLED = 256, 16
 
 
+def call_function(function: ca.Function, *inputs: Array) -> Array:
+    """Output of a function of one dense output at dense inputs, none of which is copied into a matrix of CasADi's."""
+    (buffer, evaluate), result = function.buffer(), np.empty(function.size_out(0), order="F")
+    given = [np.ravel(one, "F") for one in inputs]
+    for i, one in enumerate(given):
+        buffer.set_arg(i, memoryview(one))
+    buffer.set_res(0, memoryview(result.T))
+    with hold_interrupts():
+        evaluate()
+    return result
+
+
 def input_symbols(model: Dynamics) -> list[ca.SX]:
     """State, memory, commands, environment and parameters as symbols."""
     states = ca.SX.sym("state", len(model.state) + len(model.hidden))
@@ -105,8 +117,8 @@ def run_casadi(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[A
     drawn = [part.transpose(2, 0, 1).reshape(-1, num_samples) for part in batch.components]
     records, worst = [], []
     for values in batch.parameters:
-        with hold_interrupts():
-            result = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
+        fixed = np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])
+        result = call_function(mapped, *inputs, fixed)
         path = result.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
         records.append(path[:, :, list(job.rows)])
@@ -115,7 +127,7 @@ def run_casadi(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[A
 
 
 @lru_cache(maxsize=32)
-def _memory_scan(model: Dynamics) -> tuple[ca.Function, tuple[int, ...]]:
+def _memory_scan(model: Dynamics, num_runs: int) -> tuple[ca.Function, tuple[int, ...]]:
     """(memory, its orders, dt, parameters) -> memory after each of `BLOCK` steps, and which parameters it takes.
 
     All commands and parameters at every step would cost more than the steps, as would a call of each step.
@@ -127,26 +139,32 @@ def _memory_scan(model: Dynamics) -> tuple[ca.Function, tuple[int, ...]]:
     used = tuple(np.flatnonzero(ca.which_depends(after, parameters, 1, False)).tolist())
     of_memory = [model.commands.index(name) for name in model.memory]
     steps = ca.Function("advance", [memory, order[of_memory], dt, parameters[list(used)]], [after]).mapaccum(UNROLLED)
-    return steps.expand().mapaccum(BLOCK // UNROLLED), used
+    scan = steps.expand().mapaccum(BLOCK // UNROLLED)
+    return scan.map("runs", "serial", num_runs, [2, 3], []), used
 
 
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
-    """Hidden actuator states (n,) along one run's orders (n,) at the times t (n,) [s]; None if the vessel has none.
+    """Hidden actuator states (n,) or (n, R) along the orders of one run or of R at the times t (n,) [s] of all of them.
 
-    The states begin at the first order; each order is held until the next row. They are simulated, not measured.
+    None if the vessel has none. The states begin at the first order; each order is held until the next row. They are
+    simulated, not measured.
     """
     model = vessel_dynamics(vessel)
     if not model.memory:
         return None
     orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.memory])
-    (scan, used), parts = _memory_scan(model), [orders[:, :1]]
-    values = ca.DM(np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK)))
+    shape, orders = orders.shape, orders.reshape(len(orders), len(t), -1).transpose(0, 2, 1)  # (M, R, n)
+    (scan, used), parts = _memory_scan(model, orders.shape[1]), [orders[:, :, :1]]
+    values = np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK))
     dt, count = np.diff(t), len(t) - 1
     held = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1)  # the last block is padded
-    with hold_interrupts():
-        for rows in held.reshape(-1, BLOCK):
-            parts.append(np.array(scan(parts[-1][:, -1], orders[:, rows], dt[None, rows], values)))
-    return dict(zip(model.memory, np.concatenate(parts, axis=1)[:, : len(t)], strict=True))
+    for rows in held.reshape(-1, BLOCK):
+        reached = call_function(
+            scan, parts[-1][:, :, -1], orders[:, :, rows].reshape(len(orders), -1), dt[rows], values
+        )
+        parts.append(reached.reshape(len(orders), -1, BLOCK))
+    along = np.concatenate(parts, axis=2)[:, :, : len(t)].transpose(0, 2, 1).reshape(shape)
+    return dict(zip(model.memory, along, strict=True))
 
 
 @lru_cache(maxsize=64)
@@ -166,5 +184,5 @@ def evaluate_samples(
     count = len(inputs[0][0])
     given, mapped = [np.array(part).reshape(len(part), count) for part in inputs], _map_function(model, name)
     blocks = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(-1, BLOCK)  # the last is padded
-    parts = [np.array(mapped(*(part[:, samples] for part in given), parameters)) for samples in blocks]
+    parts = [call_function(mapped, *(part[:, samples] for part in given), parameters) for samples in blocks]
     return np.concatenate(parts, axis=1)[:, :count]

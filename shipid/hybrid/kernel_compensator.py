@@ -31,14 +31,44 @@ def kernel_group(name: str) -> str:
     return "position" if name[-2:] in (".x", ".y") else "turned" if name.startswith("turned") else group
 
 
+def with_constant(values: Any, maths: Any = np) -> Any:
+    """Values (..., d + 1): those given, and 1."""
+    return maths.concatenate((values, maths.ones_like(values[..., :1])), -1)
+
+
+def bell_values(points: Any, centres: Any, maths: Any = np) -> Any:
+    """exp(-|z - c|^2 / 2) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales.
+
+    The exponent is one product of matrices, [z, 1, -|z|^2 / 2] [c, -|c|^2 / 2, 1]^T.
+    """
+    near, far = ((one**2).sum(-1)[..., None] / -2 for one in (points, centres))
+    left = maths.concatenate((with_constant(points, maths), near), -1)
+    values = left @ with_constant(maths.concatenate((centres, far), -1), maths).T
+    return maths.exp(values, out=values)
+
+
+def mirrored_sides(values: Array, reflection: Array | None) -> Array:
+    """Normalised inputs (K, S, d): as they are, and their images where there is a mirror."""
+    return np.stack([values] if reflection is None else [values, values @ reflection])
+
+
 def kernel_values(points: Any, centres: Any, linear: Any, maths: Any = np) -> Any:
     """exp(-|z - c|^2 / 2) + l (1 + z c) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales."""
-    product = points @ centres.T
-    values = product - (points**2).sum(-1).reshape(*points.shape[:-1], 1) / 2
-    values -= (centres**2).sum(-1) / 2
-    product += 1
-    product *= linear
-    return maths.exp(values) + product
+    values = bell_values(points, centres, maths)
+    values += (linear * with_constant(points, maths)) @ with_constant(centres, maths).T
+    return values
+
+
+def weighed_kernels(sides: Any, centres: Any, linear: Any, weights: Any, maths: Any = np) -> Any:
+    """Kernels times weights (C, R), (S, R), of windows as they are and, where there is a mirror, of their images.
+
+    sides : (K, S, d), K being 1 or 2. centres : (C, d). Both are divided by their scales. The linear kernel goes
+    through the few inputs, not through the centres.
+    """
+    slopes = linear * (with_constant(centres, maths).T @ weights)
+    values = bell_values(sides, centres, maths) @ weights + with_constant(sides, maths) @ slopes
+    values[1:, :, weights.shape[1] // 2 :] *= -1
+    return values.sum(0)
 
 
 @dataclass(frozen=True)
@@ -66,12 +96,9 @@ class KernelCompensator(PathCorrector):
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
-        z, terms = self.normaliser.apply(table), self.basis.shape[1]
-        total: Any = 0.0
-        for one in self.members:
-            centres = self.centres / one.scales
-            total = total + kernel_values(z / one.scales, centres, one.linear) @ one.weights
-            if self.reflection is not None:
-                image = kernel_values(z @ self.reflection / one.scales, centres, one.linear) @ one.weights
-                total = total + np.repeat([1.0, -1.0], terms) * image
-        return weigh_shapes(self.basis, total / len(self.members))
+        sides = mirrored_sides(self.normaliser.apply(table), self.reflection)
+        outputs = (
+            weighed_kernels(sides / one.scales, self.centres / one.scales, one.linear, one.weights)
+            for one in self.members
+        )
+        return weigh_shapes(self.basis, sum(outputs) / len(self.members))

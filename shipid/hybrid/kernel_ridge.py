@@ -15,7 +15,17 @@ from scipy.optimize import minimize
 from torch import Tensor
 
 from shipid.hybrid.compensator import unflatten_paths
-from shipid.hybrid.kernel_compensator import GROUPS, KernelCompensator, KernelMember, kernel_group, kernel_values
+from shipid.hybrid.kernel_compensator import (
+    GROUPS,
+    KernelCompensator,
+    KernelMember,
+    bell_values,
+    kernel_group,
+    kernel_values,
+    mirrored_sides,
+    weighed_kernels,
+    with_constant,
+)
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_folds
@@ -40,9 +50,7 @@ class KernelProblem(PathProblem):
         self.scales = [f"{kernel_group(name)}_scale" for name in self.varying.normaliser.names]
         values, reflection = self.varying.normaliser.apply(self.table), self.varying.reflection
         self.values, self.outputs = self._tensor(values), self._tensor(self.weights.T)  # (S, d), (2, S, r)
-        self.sides = self._tensor(
-            np.stack([values] if reflection is None else [values, values @ reflection])
-        )  # (K, S, d)
+        self.sides = self._tensor(mirrored_sides(values, reflection))  # (K, S, d)
         if reflection is None:
             self.outputs = torch.cat([*self.outputs], dim=1)[None]
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
@@ -54,7 +62,7 @@ class KernelProblem(PathProblem):
 
     def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> Tensor:
         """Kernels (K, S, C) between windows, with the settings of a trial: those of x and of y, or one of both."""
-        scales = torch.stack([self._tensor(settings[name]) for name in self.scales])
+        scales = self._tensor([settings[name] for name in self.scales])
         sides, around = self.sides[:, points] / scales, self.values[centres] / scales
         return mirror_sums(kernel_values(sides, around, settings["linear"], torch))
 
@@ -77,25 +85,25 @@ class KernelProblem(PathProblem):
         blocks, names = FoldBlocks(folds, rows, self.task.device), list(ranges)
         prior = PRIOR / len(np.unique(self.task.windows.run[rows]))
         start, ends = (np.log([table[name] for name in names]) for table in (point, ranges))
-        groups, outputs = list(dict.fromkeys(self.scales)), self.outputs[:, rows]
-        products, squares = self.group_products(rows, groups)
-        shape = (len(self.sides), len(rows), len(rows))
+        values, sides, outputs = self.values[rows], self.sides[:, rows], self.outputs[:, rows]
+        groups = list(dict.fromkeys(self.scales))
+        of_group = self._tensor(np.array(groups)[:, None] == self.scales)  # (G, d)
 
         def value_and_slope(logs: Array) -> tuple[float, Array]:
             settings = {**point, **dict(zip(names, np.exp(logs), strict=True))}
-            weights = self._tensor([settings[group] ** -2 for group in groups])
-            product, half = (weights @ products).view(shape), weights @ squares / 2
-            bell = torch.exp(product - half[:, None] - half)
-            whole = mirror_sums(bell + settings["linear"] * (1 + product))
+            scales, linear = self._tensor([settings[name] for name in self.scales]), settings["linear"]
+            z, images = values / scales, with_constant(sides / scales, torch)
+            bell, plane = bell_values(images[..., :-1], z, torch), with_constant(z, torch)
+            whole = mirror_sums(bell + (linear * images) @ plane.T)
             whole.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
             missed, slope = blocks.errors_and_slope(whole, outputs)
             by_ridge, plain = slope.diagonal(dim1=1, dim2=2).sum(), mirror_sums(slope)
-            product, bell, linear = plain * (1 + product), plain * bell, settings["linear"]
-            by_weight = (
-                products @ (bell + linear * plain).flatten() - squares @ (bell.sum((0, 1)) + bell.sum((0, 2))) / 2
-            )
-            slopes = dict(zip(groups, -2 * weights * by_weight, strict=True))
-            slopes |= {"linear": linear * product.sum(), "ridge": settings["ridge"] * by_ridge}
+            bell *= plain
+            by_linear = linear * (images * (plain @ plane)).sum((0, 1))
+            by_input = (images[..., :-1] * (bell @ z)).sum((0, 1)) + by_linear[:-1]
+            by_input -= (bell.sum((0, 1)) + bell.sum((0, 2))) @ z**2 / 2
+            slopes = dict(zip(groups, -2 * of_group @ by_input, strict=True))
+            slopes |= {"linear": by_linear.sum(), "ridge": settings["ridge"] * by_ridge}
             value, away = float((missed**2).sum()), logs - start
             slope_of_logs = np.array([float(slopes[name]) for name in names])
             return np.log(value) + prior * away @ away, slope_of_logs / value + 2 * prior * away
@@ -107,18 +115,29 @@ class KernelProblem(PathProblem):
         chosen = {**point, **dict(zip(names, map(float, values), strict=True))}
         return float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)
 
-    def group_products(self, rows: Index, groups: Sequence[str]) -> tuple[Tensor, Tensor]:
-        """Products of windows, as they are and mirrored, (G, K S S), and their squares (G, S), by group of inputs."""
-        own = self._tensor(np.array(groups)[:, None] == self.scales)[:, None]  # (G, 1, d)
-        values = self.values[rows] * own
-        return (self.sides[:, rows] @ values.mT[:, None]).flatten(1), (values**2).sum(dim=2)
+    def solve(self, settings: Mapping[str, Any], folds: Sequence[tuple[Index, Index]]) -> list[Tensor]:
+        """Weights (C, K R) of a solution, and of those without each fold.
 
-    def solve(self, settings: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
-        """G (K, C, C) and weights (K, C, R)."""
-        kernel = self.kernels(self.part, self.part, settings)
+        Centres that any fold leaves out come last in the Cholesky factor, [[L, 0], [A, B]]: the last block of G is then
+        the inverse of B B^T, and what is above it is -L^-T A^T times that.
+        """
+        outs = np.array(
+            [np.zeros(len(self.part), dtype=bool), *(~np.isin(self.part, training) for training, _ in folds)]
+        )
+        order, first = np.argsort(outs.any(axis=0), kind="stable"), int((~outs.any(axis=0)).sum())
+        part = self.part[order]
+        kernel = self.kernels(part, part, settings)
         kernel.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
-        inverse = torch.cholesky_inverse(torch.linalg.cholesky(kernel))
-        return inverse, inverse @ self.outputs[:, self.part]
+        factor = torch.linalg.cholesky(kernel)
+        weights = torch.cholesky_solve(self.outputs[:, part], factor)
+        top, across, inverse = factor[:, :first, :first], factor[:, first:, :first], factor[:, first:, first:]
+        inverse, last = torch.cholesky_inverse(inverse), weights[:, first:]
+        places = map(np.flatnonzero, outs[:, order[first:]])
+        parts = [inverse[:, :, b] @ torch.linalg.solve(inverse[:, b][:, :, b], last[:, b]) for b in places]
+        below = torch.cat(parts, dim=2)
+        above = torch.linalg.solve_triangular(top.mT, across.mT @ below, upper=True)
+        changes = torch.cat([-above, below], dim=1).split(weights.shape[2], dim=2)
+        return [torch.cat([*(weights - change)[:, np.argsort(order)]], dim=1) for change in changes]
 
     def corrector(self, best: Sequence[Row]) -> KernelCompensator:
         """Return the mean of the solutions, and keep what those of the trials miss without each fold."""
@@ -128,30 +147,18 @@ class KernelProblem(PathProblem):
             tried.append((self.descend(next(iter(self.method.points())))[1], []))
         errors = np.full_like(self.targets, np.nan)
         for settings, folds in tried:
-            solved, scales = self.solve(settings), np.array([settings[name] for name in self.scales])
-            weights = torch.cat([*solved[1]], dim=1).cpu().numpy()
-            members.append(KernelMember(scales, settings["linear"], weights))
-            self._leave_out(folds, settings, solved, errors)
+            scales = np.array([settings[name] for name in self.scales])
+            weights, *others = self.solve(settings, folds)
+            members.append(KernelMember(scales, settings["linear"], weights.cpu().numpy()))
+            sides, around = (each / self._tensor(scales) for each in (self.sides, self.values[self.part]))
+            for (_, judged), own in zip(folds, others, strict=True):
+                paths = weighed_kernels(sides[:, judged], around, settings["linear"], own, torch)
+                outputs = unflatten_paths(paths.cpu().numpy())
+                errors[:, judged] = self.targets[:, judged] - np.tensordot(self.basis, outputs, 1)
         self.left_out = errors if self.parts > 1 else None
         return KernelCompensator(
             self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[0][0]
         )
-
-    def _leave_out(
-        self,
-        folds: Sequence[tuple[Index, Index]],
-        settings: Mapping[str, Any],
-        solved: tuple[Tensor, Tensor],
-        errors: Array,
-    ) -> None:
-        """Write errors (T, S, 2) [m] on the judged windows of folds, by solutions without each fold."""
-        for training, judged in folds:
-            out = np.flatnonzero(~np.isin(self.part, training))
-            inverse, weights = solved
-            missed = torch.linalg.solve(inverse[:, out][:, :, out], weights[:, out])
-            paths = self.kernels(judged, self.part, settings) @ (weights - inverse[:, :, out] @ missed)
-            outputs = unflatten_paths(torch.cat([*paths], dim=1).cpu().numpy())
-            errors[:, judged] = self.targets[:, judged] - np.tensordot(self.basis, outputs, 1)
 
 
 def mirror_sums(sides: Tensor) -> Tensor:
@@ -189,9 +196,10 @@ class FoldBlocks:
         weights, columns = inverse @ outputs, inverse[:, self.out]  # (K, F, b, S)
         both = self.known[:, :, None] & self.known[:, None, :]
         eye = torch.eye(both.shape[1], dtype=kernel.dtype, device=kernel.device)
-        blocks = torch.where(both, columns.take_along_dim(self.out[None, :, None], dim=3), eye)
+        blocks = torch.where(both, inverse[:, self.out[:, :, None], self.out[:, None]], eye)
         factors = torch.linalg.cholesky(blocks)
         every = torch.cholesky_solve(self.known[..., None] * weights[:, self.out], factors)
         missed = self.judged[..., None] * every
-        left, right = ((columns.mT @ one).transpose(1, 2) for one in (torch.cholesky_solve(missed, factors), every))
-        return missed, 2 * (left.flatten(2) @ right.flatten(2).mT - left.sum(dim=2) @ weights.mT)
+        within = torch.cholesky_solve(missed, factors)
+        inner = (within @ every.mT) @ columns - within @ weights.mT[:, None]
+        return missed, 2 * columns.flatten(1, 2).mT @ inner.flatten(1, 2)

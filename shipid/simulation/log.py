@@ -41,6 +41,8 @@ def horizontal_velocities(columns: Mapping[str, Any], maths: Any = np) -> dict[s
 
 def body_velocities(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
     """Body-fixed u, v [m/s], r [rad/s] of a log: inverse of `horizontal_velocities`; w, q are body-fixed."""
+    if not any(name in columns for name in LEANING):
+        return {name: columns[name] for name in ("u", "v", "r")}
     zero = 0.0 * columns["u"]
     phi, theta, w, q = (columns.get(name, zero) for name in LEANING)
     v = (columns["v"] + w * maths.sin(phi)) / maths.cos(phi)
