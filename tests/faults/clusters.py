@@ -16,9 +16,8 @@ from unittest.mock import patch
 
 from shipid.errors import ShipidError
 from shipid.study.run import run_study
-from tests.faults.folders import _continued, _same_as_reference, a_place, reference
+from tests.faults.folders import _continued, _same_as_reference, a_place, reference, searched_plan
 from tests.faults.trials import Failure
-from tests.study.tiny import tiny_plan
 
 
 @contextmanager
@@ -64,7 +63,7 @@ def worker_lost(seed: int) -> None:
     reference()
     with a_place() as place, patch.dict(os.environ, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="45s"):
         with a_cluster(place, 2) as (address, processes):
-            plan, victim = tiny_plan(place), rng.choice(processes[1:])
+            plan, victim = searched_plan(place), rng.choice(processes[1:])
             how, after = ["killed", "stopped", "paused"][seed % 3], rng.choice(["start", "cell"])
             for event in run_study(plan, place / "run", scheduler=address):
                 if event.kind == after:
@@ -80,7 +79,7 @@ def died(seed: int) -> None:
     rng = random.Random(seed)
     reference()
     with a_place() as place, a_cluster(place) as (address, processes):
-        plan = tiny_plan(place)
+        plan = searched_plan(place)
         victim = processes[0] if seed % 2 == 0 else processes[1]
         after = rng.choice(["start", "cell"])
         began = time.monotonic()

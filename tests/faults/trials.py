@@ -53,21 +53,23 @@ def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HA
         process.start()
         there.close()
         begun = time.monotonic()
-        while left:
-            try:
-                waiting = here.poll(max(0.0, begun + limit - time.monotonic()))
-                end = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
-            except EOFError:
-                process.join()
-                end = Outcome(left[0], "died", f"exit code {process.exitcode}")
-            begun = time.monotonic()
-            left.pop(0)
-            yield end
-            if end.kind in ("hang", "died"):
-                break
-        process.kill()
-        process.join()
-        here.close()
+        try:
+            while left:
+                try:
+                    waiting = here.poll(max(0.0, begun + limit - time.monotonic()))
+                    end = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
+                except EOFError:
+                    process.join()
+                    end = Outcome(left[0], "died", f"exit code {process.exitcode}")
+                begun = time.monotonic()
+                left.pop(0)
+                yield end
+                if end.kind in ("hang", "died"):
+                    break
+        finally:
+            process.kill()
+            process.join()
+            here.close()
 
 
 def _serve(pipe: Connection, work: Callable[[int], Any], seeds: Sequence[int]) -> None:
