@@ -51,7 +51,7 @@ ROWS: dict[str, Row] = {
     "clock": Row(folders.clocks, 200, "the time jumps, files are of the future", 200.0),
     "version": Row(folders.another_version, 500, "keys of another version, sealed", 60.0),
     "ships": Row(folders.ships, 500, "SIGKILL, and files changed", 60.0),
-    "exported": Row(documents.sanitized, 60, "gcc -fsanitize=address,undefined", 120.0),
+    "exported": Row(documents.sanitized, 60, "sanitizers of gcc and clang", 120.0),
     "options": Row(documents.options, 500, "of expect and vessel similar"),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
     "worker": Row(clusters.worker_lost, 12, "one of two killed, stopped, stopped for a while", 300.0),
