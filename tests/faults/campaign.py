@@ -55,6 +55,7 @@ ROWS: dict[str, Row] = {
     "options": Row(documents.options, 500, "of expect and vessel similar"),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
     "worker": Row(clusters.worker_lost, 12, "one of two killed, stopped, stopped for a while", 300.0),
+    "hosts": Row(clusters.two_hosts, 60, "one processor begins, another goes on", 300.0),
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }
 EVERY = 30.0  # s between lines of progress
