@@ -24,7 +24,7 @@ QUICK = {
     "memory": 6,
     "mcap log": 4,
     "ulg log": 4,
-    "exchanged log": 4,
+    "exchanged log": 20,
     "function": 6,
     "predictions": 6,
     "package": 3,
