@@ -341,6 +341,7 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
         for repair in others
     ]
     rows, more = apply_repairs(rows, others, off, file)
+    _check_limits(rows, t, numbered, file)  # which would overflow in the filter
     rows, estimated = _estimate_velocities(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     relative = mapping.columns["beta_w"].relative if "beta_w" in mapping.columns else False
     if relative == "angle":
