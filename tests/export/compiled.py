@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +23,11 @@ GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
-def compiler() -> str:
-    """A C compiler; the test is skipped where there is none."""
-    program = shutil.which("gcc") or shutil.which("cc") or shutil.which("clang")
+def compiler(*names: str) -> str:
+    """The first C compiler of these names that there is, or any; the test is skipped where there is none."""
+    program = next(filter(None, map(shutil.which, names or ("gcc", "cc", "clang"))), None)
     if program is None:
-        pytest.skip("no C compiler")
+        pytest.skip(f"there is no {' or '.join(names) or 'C compiler'} here")
     return program
 
 
@@ -67,10 +67,10 @@ def library(files: SourceFiles, folder: Path, *options: str) -> ctypes.CDLL:
     return ctypes.CDLL(str(_BUILT[key]))
 
 
-def run_example(files: SourceFiles, folder: Path, *options: str) -> str:
-    """Output of the example."""
+def run_example(files: SourceFiles, folder: Path, *options: str, names: Sequence[str] = ()) -> str:
+    """Output of the example, by a compiler of these names."""
     write(files, folder)
-    compile_([compiler()], folder, *(options or ("-O0",)), "-o", "example", "main.c", *sources(files))
+    compile_([compiler(*names)], folder, *(options or ("-O0",)), "-o", "example", "main.c", *sources(files))
     result = subprocess.run([folder / "example"], capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from tests.faults import clusters, documents, folders, foundations, recordings
@@ -40,7 +41,7 @@ ROWS: dict[str, Row] = {
     "predictor": Row(folders.predictor, 300, "arrays and header changed"),
     "dataset": Row(folders.dataset, 300, "columns and metadata changed"),
     "damaged": Row(folders.damaged, 1000, "files of a folder changed", 60.0),
-    "killed": Row(folders.killed, 1000, "SIGKILL at an intercepted call", 200.0),
+    "killed": Row(folders.killed, 250, f"{folders.KILLS} SIGKILL of a run or worker at intercepted calls", 300.0),
     "full": Row(folders.full, 200, "limit of file size, and intercepted calls", 200.0),
     "together": Row(folders.together, 60, "processes", 300.0),
     "two plans": Row(folders.two_plans, 60, "processes", 300.0),
@@ -50,10 +51,11 @@ ROWS: dict[str, Row] = {
     "clock": Row(folders.clocks, 200, "the time jumps, files are of the future", 200.0),
     "version": Row(folders.another_version, 500, "keys of another version, sealed", 60.0),
     "ships": Row(folders.ships, 500, "SIGKILL, and files changed", 60.0),
-    "exported": Row(documents.sanitized, 60, "gcc -fsanitize=address,undefined", 120.0),
+    "exported": Row(documents.sanitized, 60, "sanitizers of gcc and clang", 120.0),
     "options": Row(documents.options, 500, "of expect and vessel similar"),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
     "worker": Row(clusters.worker_lost, 12, "one of two killed, stopped, stopped for a while", 300.0),
+    "hosts": Row(clusters.two_hosts, 60, "one processor begins, another goes on", 300.0),
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }
 EVERY = 30.0  # s between lines of progress
@@ -70,15 +72,16 @@ def campaign(scale: float, seed: int, only: tuple[str, ...] = ()) -> dict[str, l
         if row.trial.__module__ == folders.__name__:
             folders.reference()  # once, before the trials fork
         trials, told = [], begun
-        for one in outcomes(row.trial, range(first, first + count), row.limit):
-            trials.append(one)
-            if one.failed:
-                print(f"{name}, trial {one.trial}: {one.kind}: {one.words}", file=sys.stderr, flush=True)
-            if time.perf_counter() - told > EVERY:
-                told = time.perf_counter()
-                print(f"... {name}: {len(trials)} of {count} trials", file=sys.stderr, flush=True)
+        with suppress(KeyboardInterrupt):  # the row ends with the trials that it has
+            for one in outcomes(row.trial, range(first, first + count), row.limit):
+                trials.append(one)
+                if one.failed:
+                    print(f"{name}, trial {one.trial}: {one.kind}: {one.words}", file=sys.stderr, flush=True)
+                if time.perf_counter() - told > EVERY:
+                    told = time.perf_counter()
+                    print(f"... {name}: {len(trials)} of {count} trials", file=sys.stderr, flush=True)
         rows[f"{name} ({row.made})"] = trials
         failed = sum(one.failed for one in trials)
-        words = f"{count} trials, {failed} failed, {time.perf_counter() - begun:.0f} s"
+        words = f"{len(trials)} trials, {failed} failed, {time.perf_counter() - begun:.0f} s"
         print(f"{name}: {words}", file=sys.stderr, flush=True)
     return rows

@@ -1,4 +1,4 @@
-"""A row of the campaign: a Dask scheduler or its workers die while a study runs on them."""
+"""Rows of the campaign: a Dask scheduler or its workers die, and hosts with other processors share a folder."""
 
 from __future__ import annotations
 
@@ -9,16 +9,30 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
+
+from shipid.engine import engines, native
 from shipid.errors import ShipidError
+from shipid.study.results import read_results
 from shipid.study.run import run_study
-from tests.faults.folders import _continued, _same_as_reference, a_place, reference
+from shipid.study.store import PROVENANCE, provenance
+from tests.export.compiled import compiler
+from tests.faults.folders import (
+    _continued,
+    _killed_at,
+    _same_as_reference,
+    a_place,
+    child,
+    reference,
+    run_here,
+    searched_plan,
+)
 from tests.faults.trials import Failure
-from tests.study.tiny import tiny_plan
 
 
 @contextmanager
@@ -64,7 +78,7 @@ def worker_lost(seed: int) -> None:
     reference()
     with a_place() as place, patch.dict(os.environ, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="45s"):
         with a_cluster(place, 2) as (address, processes):
-            plan, victim = tiny_plan(place), rng.choice(processes[1:])
+            plan, victim = searched_plan(place), rng.choice(processes[1:])
             how, after = ["killed", "stopped", "paused"][seed % 3], rng.choice(["start", "cell"])
             for event in run_study(plan, place / "run", scheduler=address):
                 if event.kind == after:
@@ -80,7 +94,7 @@ def died(seed: int) -> None:
     rng = random.Random(seed)
     reference()
     with a_place() as place, a_cluster(place) as (address, processes):
-        plan = tiny_plan(place)
+        plan = searched_plan(place)
         victim = processes[0] if seed % 2 == 0 else processes[1]
         after = rng.choice(["start", "cell"])
         began = time.monotonic()
@@ -97,3 +111,50 @@ def died(seed: int) -> None:
         if time.monotonic() - began > 120:
             raise Failure("hang", "more than 120 s until the line")
         _continued(place, f"killed at {after}")
+
+
+HOSTS = {"own": "$", "avx2": "avx512", "sse2": "avx|fma"}
+"""Processor of a host -> features of the one of this machine that it lacks."""
+COMPILER = """#!/bin/sh
+for word do shift; [ "$word" = -march=native ] && word=-march={}; set -- "$@" "$word"; done
+exec {} "$@"
+"""
+
+
+def on_host(name: str, place: Path, work: Callable[[], None]) -> int:
+    """Exit code of work on a host with another processor, for the engine; hosts share a cache of libraries."""
+
+    def there() -> None:
+        (place / "gcc").write_text(COMPILER.format("native" if name == "own" else "haswell", compiler("gcc")))
+        (place / "gcc").chmod(0o755)
+        flags = frozenset(one for one in native._processor_flags() if not re.match(HOSTS[name], one))
+        os.environ.update(PATH=f"{place}:{os.environ['PATH']}", XDG_CACHE_HOME=str(place / "cache"))
+        native.compiler_target.cache_clear()
+        native._compiler_on_path.cache_clear()
+        with patch.object(native, "_processor_flags", lambda: flags), patch.object(engines, "NATIVE_FROM", 0.0):
+            work()
+
+    return child(there)
+
+
+def two_hosts(seed: int) -> None:
+    """A host begins a study and one with another processor goes on with it: said in the folder, numbers to rounding."""
+    rng, flags = random.Random(f"hosts {seed}"), native._processor_flags()
+    first, second = rng.sample([name for name in HOSTS if name != "avx2" or "avx512f" in flags], 2)
+    with a_place() as place:
+        plan, folder, at = searched_plan(place), place / "run", rng.randrange(reference()[2])
+        on_host(first, place, lambda: _killed_at(at, lambda: run_here(plan, folder)))
+        begun = provenance(folder)["sessions"] if (folder / PROVENANCE).exists() else []
+        libraries = {*place.glob("cache/*/*.so")}
+        what = f"{first}, killed at call {at}, then {second}"
+        if code := on_host(second, place, lambda: run_here(plan, folder)):
+            raise Failure("not resumed", what, f"exit code {code}")
+        if not {*place.glob("cache/*/*.so")} - libraries:
+            raise Failure("mixed", what, "libraries of the other processor are used")
+        if begun and len({one["engine"] for one in provenance(folder)["sessions"]}) < 2:
+            raise Failure("not said", what)
+        on_host(first, place, lambda: run_here(plan, place / "alone"))
+        cells, alone = (read_results(one).cells.select_dtypes("float") for one in (folder, place / "alone"))
+        for name in cells.columns.drop("seconds", errors="ignore"):
+            if not np.allclose(cells[name], alone[name], rtol=1e-9, atol=1e-12, equal_nan=True):
+                raise Failure("mixed", what, name, str((cells[name] - alone[name]).abs().max()))

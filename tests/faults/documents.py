@@ -34,6 +34,8 @@ from tests.faults.trials import Failure
 from tests.study.tiny import whole_unit
 
 BAD = Path(__file__).parents[1] / "bad"
+MEMORY_ERRORS = "-fsanitize=memory,undefined,local-bounds,nullability"  # of clang: of what was never written, too
+SANITIZED = [("gcc", *SANITIZERS), ("clang", *SANITIZERS), ("clang", "-g", MEMORY_ERRORS, SANITIZERS[-1])]
 RUNNABLE = 2e5  # steps of a truth, or cells: a larger one is planned only
 
 
@@ -77,7 +79,7 @@ def mapping(seed: int) -> None:
 
 
 def sanitized(seed: int) -> None:
-    """The exported C of a drawn predictor, or of a drawn ship, runs under sanitizers of addresses and arithmetic."""
+    """The C of a drawn predictor or ship runs under sanitizers of addresses and arithmetic, of GCC or of clang."""
     rng = random.Random(f"sanitized {seed}")
     most = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (most, most))  # sanitizers reserve terabytes
@@ -88,8 +90,9 @@ def sanitized(seed: int) -> None:
         files = predictor_files(
             build_model(next(one for one in draws if one.predictor.physics.observer is None).predictor), "odd"
         )
+    name, *options = SANITIZED[seed // 2 % len(SANITIZED)]
     with tempfile.TemporaryDirectory() as folder:
-        run_example(files, Path(folder), *SANITIZERS)
+        run_example(files, Path(folder), *options, names=[name])
 
 
 def chain(seed: int) -> None:

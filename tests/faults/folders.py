@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import errno
+import io
 import json
 import os
 import random
@@ -13,8 +14,8 @@ import signal
 import tempfile
 import time
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,24 +33,31 @@ from shipid.files import TEMPORARY
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.check import check_folder
+from shipid.study.plan import Plan
 from shipid.study.results import read_results
 from shipid.study.run import prepare_study, run_study
 from shipid.study.seals import has_writer
 from tests.faults.trials import PATIENCE, Failure
-from tests.study.tiny import run_here as run_in_process
-from tests.study.tiny import tiny_plan, without_workers
+from tests.study.tiny import tiny_plan
 
 PLACE = "/dev/shm" if Path("/dev/shm").is_dir() else None
 """Where the folders of trials are: in memory, where syncing takes no time."""
-CALLS = ("mkdir", "replace", "rename", "link", "unlink", "rmdir", "fsync", "utime")
-"""Calls of the system by which a folder changes: a run is stopped before, within and after each."""
+CALLS = ("mkdir", "replace", "rename", "link", "unlink", "rmdir", "fsync", "utime", "truncate")
+"""Calls of the system by which a folder changes, beside each line that is appended to a file: a run is stopped before,
+within and after each."""
+KILLS = 4  # of a folder in a trial
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def run_here(plan: Any, folder: Path) -> Any:
-    """Run a plan in this process, which is a fork: without the server from which workers fork."""
-    with patch("shipid.study.run.import_for_workers", lambda: None):
-        return run_in_process(plan, folder)
+def run_here(plan: Plan, folder: Path, workers: int = 0, **means: Any) -> None:
+    """Run a plan in this process, which is a fork, or in workers that fork from it."""
+    with patch("shipid.study.workers.METHOD", "fork"):
+        list(run_study(plan, folder, workers=workers, **means))
+
+
+def searched_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
+    """Plan of the tiny study with three trials in a search, so that one may be stopped between two of them."""
+    return tiny_plan(folder, {"method.drawn.trials": 3, **(changes or {})})
 
 
 @cache
@@ -63,7 +71,7 @@ def reference() -> tuple[Path, dict[str, bytes], int]:
         count[0] += 1
         return call(*arguments, **named)
 
-    plan = tiny_plan(folder)
+    plan = searched_plan(folder)
     run_here(plan, folder / "warm")
     with intercepted(counted):
         run_here(plan, folder / "run")
@@ -74,25 +82,31 @@ def reference() -> tuple[Path, dict[str, bytes], int]:
 def donor() -> Path:
     """A finished run of another world, whose files have the names of those of the reference."""
     place = reference()[0].parent
-    run_here(tiny_plan(place, {"truth.seed": 7}), place / "donor")
+    run_here(searched_plan(place, {"truth.seed": 7}), place / "donor")
     return place / "donor"
 
 
 @contextmanager
 def intercepted(instead: Callable[..., Any]) -> Iterator[None]:
-    """Give every call of `CALLS` to `instead`: (name, call, arguments, named arguments) -> result."""
-    before = {name: getattr(os, name) for name in CALLS}
+    """Give every call of `CALLS`, and each append, to `instead`: (name, call, arguments, named arguments) -> result."""
 
-    def replacement(name: str) -> Callable[..., Any]:
-        return lambda *arguments, **named: instead(name, before[name], arguments, named)
+    class Appended(io.FileIO):
+        def write(self, line: Any) -> int:
+            return instead("append", super().write, (line,), {})  # type: ignore[no-any-return]
 
-    try:
+    def opened(file: Any, mode: str = "r", *arguments: Any, **named: Any) -> Any:
+        return Appended(file, mode) if mode == "ab" else plain(file, mode, *arguments, **named)
+
+    def replacement(name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *arguments, **named: instead(name, call, arguments, named)
+
+    plain = io.open
+    with ExitStack() as stack:
         for name in CALLS:
-            setattr(os, name, replacement(name))
+            stack.enter_context(patch.object(os, name, replacement(name, getattr(os, name))))
+        for place in ("io.open", "builtins.open"):
+            stack.enter_context(patch(place, opened))
         yield
-    finally:
-        for name, call in before.items():
-            setattr(os, name, call)
 
 
 def stored(folder: Path) -> dict[str, bytes]:
@@ -179,7 +193,7 @@ def a_place() -> Iterator[Path]:
 
 def _continued(place: Path, what: str) -> None:
     """Run the plan to its end in a folder, as often as a patient user would, and compare."""
-    plan = tiny_plan(place)
+    plan = searched_plan(place)
     code = child(lambda: run_here(plan, place / "run"))
     if code:
         raise Failure("not resumed", what, f"exit code {code}")
@@ -187,20 +201,33 @@ def _continued(place: Path, what: str) -> None:
 
 
 def killed(seed: int) -> None:
-    """A run is killed before, within or after one of its changes of the folder, twice, and continued."""
-    rng, calls = random.Random(seed), reference()[2]
+    """A run or a worker is killed before, within or after one of its changes of the folder, four times, and continued.
+
+    Each run goes on where the one before it was killed.
+    """
+    rng, calls, words = random.Random(seed), reference()[2], list[str]()
     with a_place() as place:
-        plan = tiny_plan(place)
-        words = []
-        for _ in range(rng.choice([1, 1, 2])):
-            at, when = rng.randrange(calls), rng.choice(["before", "within", "after"])
-            words.append(f"{when} call {at}")
-            child(lambda at=at, when=when: _stopped(plan, place / "run", at, when))  # type: ignore[misc]
+        plan, folder = searched_plan(place), place / "run"
+        while len(words) < KILLS:
+            at, when = rng.randrange(calls // rng.choice([1, 3, 10])), rng.choice(["before", "within", "after"])
+            workers = rng.choice([0, 0, 2])
+            words.append(f"{when} call {at}, {workers} workers")
+            code = child(lambda: _stopped(plan, folder, at, when, workers))  # noqa: B023
+            while (
+                workers and folder.is_dir() and has_writer(folder)
+            ):  # workers hold the lock of the process they are of
+                time.sleep(0.01)
+            if code == 0:  # it ended before that call
+                _same_as_reference(folder, " and ".join(words))
+                shutil.rmtree(folder)
+                words.pop()
+            elif code != -signal.SIGKILL and not (code == 1 and workers):
+                raise Failure("not resumed", " and ".join(words), f"exit code {code}")
         _continued(place, " and ".join(words))
 
 
-def _stopped(plan: Any, folder: Path, at: int, when: str) -> None:
-    _killed_at(at, lambda: run_here(plan, folder), when)
+def _stopped(plan: Plan, folder: Path, at: int, when: str, workers: int = 0) -> None:
+    _killed_at(at, lambda: run_here(plan, folder, workers), when)
 
 
 def _killed_at(at: int, work: Callable[[], Any], when: str = "after") -> None:
@@ -214,6 +241,8 @@ def _killed_at(at: int, work: Callable[[], Any], when: str = "after") -> None:
         if when == "within" and name == "fsync":
             with suppress(OSError):
                 os.ftruncate(arguments[0], os.fstat(arguments[0]).st_size // 2)
+        if when == "within" and name == "append":
+            call(arguments[0][: len(arguments[0]) // 2])
         if when == "after":
             call(*arguments, **named)
         os.kill(os.getpid(), signal.SIGKILL)
@@ -226,14 +255,14 @@ def full(seed: int) -> None:
     """The disk is full from one change on (an intercepted call, or a limit of file size), then it has space again."""
     rng, calls = random.Random(seed), reference()[2]
     with a_place() as place:
-        plan = tiny_plan(place)
+        plan = searched_plan(place)
         at, limit = rng.randrange(calls), rng.choice([0, 100, 1000, 5000, 9800, 20000, 27050])
         by_size = seed % 2 == 0
         count = [0]
 
         def fail(name: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
             count[0] += 1
-            if count[0] > at and name in ("mkdir", "fsync", "replace", "link"):
+            if count[0] > at and name in ("mkdir", "fsync", "replace", "link", "append"):
                 raise FULL
             return call(*arguments, **named)
 
@@ -259,7 +288,7 @@ def together(seed: int) -> None:
     """Two or three runs of one plan in one folder at once, one perhaps killed: one works, the others are refused."""
     rng = random.Random(seed)
     with a_place() as place:
-        plan = tiny_plan(place)
+        plan = searched_plan(place)
         runs = []
         for _ in range(rng.choice([2, 2, 3])):
             runs.append(start(lambda: run_here(plan, place / "run")))
@@ -272,7 +301,7 @@ def together(seed: int) -> None:
         if not {*codes} <= {0, 1, -signal.SIGKILL} or (not killed_one and 0 not in codes):
             raise Failure("not one alone", f"exit codes {codes}")
         _continued(place, f"{len(runs)} runs at once")
-        other = tiny_plan(place, {"truth.seed": 7})
+        other = searched_plan(place, {"truth.seed": 7})
         if child(lambda: run_here(other, place / "run")) != 1:
             raise Failure("mixed", "another plan was not refused")
         _same_as_reference(place / "run", "after another plan")
@@ -282,7 +311,7 @@ def many_starts(seed: int) -> None:
     """Twenty runs of one plan in one folder at the same moment, two of them killed: nothing is mixed."""
     rng = random.Random(seed)
     with a_place() as place:
-        plan, gate = tiny_plan(place), time.monotonic() + 0.3
+        plan, gate = searched_plan(place), time.monotonic() + 0.3
 
         def begin() -> None:
             time.sleep(max(0.0, gate - time.monotonic()))
@@ -303,14 +332,12 @@ def shards(seed: int) -> None:
     """Shards of a plan in processes, killed or damaged, begun again and taken in by a run that may be killed, too."""
     rng, calls, count = random.Random(seed), reference()[2], random.Random(seed).choice([1, 2, 3])
     with a_place() as place:
-        plan, folder = tiny_plan(place), place / "run"
+        plan, folder = searched_plan(place), place / "run"
         for _ in prepare_study(plan, folder):
             pass
 
         def shard(number: int) -> None:
-            with without_workers(), patch("shipid.study.run.import_for_workers", lambda: None):
-                for _ in run_study(plan, folder, shard=(number, count)):
-                    pass
+            run_here(plan, folder, shard=(number, count))
 
         words = []
         for number in range(1, count + 1):
@@ -343,8 +370,11 @@ def another_user(seed: int) -> None:
             shutil.copytree(reference()[0], place / "run")
         else:
             at = rng.randrange(reference()[2] // 4, reference()[2])
-            child(lambda: _stopped(tiny_plan(place), place / "run", at, "after"))
-        theirs, kind = tiny_plan(place), rng.choice(["root's", "root's, some files one's own", "one's own, read only"])
+            child(lambda: _stopped(searched_plan(place), place / "run", at, "after"))
+        theirs, kind = (
+            searched_plan(place),
+            rng.choice(["root's", "root's, some files one's own", "one's own, read only"]),
+        )
         every = [place, *place.rglob("*")]
         for one in every if kind != "root's" else ():
             if rng.random() < 0.5 or kind.endswith("only"):
@@ -378,7 +408,7 @@ def clocks(seed: int) -> None:
     """The clock of the machine jumps by hours to years while a run works and is killed; files are of the future."""
     rng, calls, now = random.Random(seed), reference()[2], time.time
     with a_place() as place:
-        plan, shift = tiny_plan(place), [0.0]
+        plan, shift = searched_plan(place), [0.0]
 
         def jump() -> float:
             if rng.random() < 0.2:
@@ -413,7 +443,7 @@ def another_version(seed: int) -> None:
             read_results(folder).cells.to_csv(place / "x.csv")
         with suppress(ShipidError):
             check_folder(folder)
-        run_here(tiny_plan(place), folder)  # a refusal ends the trial here
+        run_here(searched_plan(place), folder)  # a refusal ends the trial here
         kept = [{file.name for file in (one / "cells").iterdir()} for one in (folder, reference()[0])]
         if kept[0] != kept[1]:
             raise Failure("mixed", what)
@@ -494,7 +524,7 @@ def two_plans(seed: int) -> None:
     """Two plans begin in one folder at once: one is refused in one line, the other ends as if alone."""
     rng = random.Random(seed)
     with a_place() as place:
-        plans = [tiny_plan(place), tiny_plan(place, {"truth.seed": 7})]
+        plans = [searched_plan(place), searched_plan(place, {"truth.seed": 7})]
         if rng.random() < 0.5:
             (place / "run").mkdir()
         runs = []
@@ -516,7 +546,7 @@ def damaged(seed: int) -> None:
             shutil.copytree(reference()[0], place / "run")
         else:
             at = rng.randrange(reference()[2] // 4, reference()[2])
-            child(lambda: _stopped(tiny_plan(place), place / "run", at, "after"))
+            child(lambda: _stopped(searched_plan(place), place / "run", at, "after"))
         words = [_damage(place / "run", rng) for _ in range(rng.choice([1, 1, 2, 3]))]
         what = ", ".join(words)
         with suppress(ShipidError):
@@ -527,7 +557,7 @@ def damaged(seed: int) -> None:
                     raise Failure("mixed", what, "read without a word")
         with suppress(ShipidError):
             check_folder(place / "run")
-        plan = tiny_plan(place)
+        plan = searched_plan(place)
         run_here(plan, place / "run")  # a refusal ends the trial here
         _same_as_reference(place / "run", what)
 

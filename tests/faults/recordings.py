@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import itertools
 import random
 import struct
 import tempfile
+import time
 import zipfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pandas as pd
@@ -29,6 +32,10 @@ from tests.logs.test_nmea import bridge_log
 from tests.logs.test_rosbag import written_bag
 from tests.logs.test_ulog import written_ulog
 
+LINKED: list[tuple[str, str, Callable[..., None]]] = [
+    *(("text", "csv", pd.DataFrame.to_csv), ("parquet", "parquet", pd.DataFrame.to_parquet)),
+    ("sheet", "xlsx", pd.DataFrame.to_excel),
+]
 GUESSED = 5  # every so many trials a mapping is guessed, too, which takes most of the time
 PACKED = {"xlsx", "ods"}  # whose parts are damaged inside, too: a checksum finds every other fault
 SOUND: dict[str, tuple[Callable[[Path], Path], Format]] = {
@@ -156,25 +163,39 @@ def _repacked(content: bytes, rng: random.Random) -> bytes:
 
 
 def exchanged(seed: int) -> None:
-    """A log whose link leads to another file at some moment of its import: one of the two, or refused."""
+    """A log whose link leads elsewhere at some moments of its import, and back: one of the two, or refused."""
     rng = random.Random(f"exchanged {seed}")
+    kind, ending, save = rng.choice(LINKED)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        logs = [as_log(turning(T, u=speed), folder / f"{speed}.csv") for speed in (3.0, 6.0)]
-        link, plain = folder / "log.csv", BAD / "logs" / "plain.toml"
-        link.symlink_to(logs[0])
-        left, opened = [rng.randrange(6)], Path.open
+        folder, whole = Path(name), rng.random() < 0.3
+        logs = [folder / f"{speed}" / f"log.{ending}" for speed in (3, 6)]
+        for speed, log in zip((3.0, 6.0), logs, strict=True):
+            log.parent.mkdir()
+            save(pd.read_csv(as_log(turning(T, u=speed), folder / "text.csv")), str(log), index=False)
+        link = folder / "link" if whole else folder / logs[0].name  # of a folder, or of a file
+        leads, plain = [log.parent if whole else log for log in logs], folder / "mapping.toml"
+        plain.write_text(f'{(BAD / "logs" / "plain.toml").read_text()}[format]\nkind = "{kind}"\n')
+        link.symlink_to(leads[0])
+        asked = link / logs[0].name if whole else link
+        time.sleep(0.02)  # more than a tick of a file system
+        moments, now, opened = rng.sample(range(8), rng.choice([1, 2, 2, 2])), itertools.count(), io.open
 
-        def exchange(file: Path, *arguments: object, **named: object) -> object:
-            if file == link and not left[0]:
-                (folder / "new").symlink_to(logs[1])
+        def exchange() -> None:
+            if next(now) in moments:
+                (folder / "new").symlink_to(leads[link.readlink() == leads[0]])
                 (folder / "new").replace(link)
-            left[0] -= file == link
-            return opened(file, *arguments, **named)  # type: ignore[call-overload]
 
-        with patch.object(Path, "open", exchange):
-            data = import_log(read_mapping(plain), link)
+        def open_log(file: object, *arguments: Any, **named: Any) -> object:
+            if str(file) != str(asked):
+                return opened(file, *arguments, **named)  # type: ignore[call-overload]
+            exchange()
+            stream = opened(asked, *arguments, **named)
+            exchange()
+            return stream
+
+        with patch("io.open", open_log), patch("builtins.open", open_log):
+            data = import_log(read_mapping(plain), asked)
         speeds = {round(value) for value in data.frame["u"]}
         digests = [import_log(read_mapping(plain), log).metadata["source"]["sha256"] for log in logs]
         if speeds != {3 if data.metadata["source"]["sha256"] == digests[0] else 6}:
-            raise Failure("mixed", f"u {speeds} under the digest of another file")
+            raise Failure("mixed", f"{ending}, moments {moments}, u {speeds} under the digest of another file")

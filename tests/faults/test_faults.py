@@ -24,7 +24,7 @@ QUICK = {
     "memory": 6,
     "mcap log": 4,
     "ulg log": 4,
-    "exchanged log": 4,
+    "exchanged log": 20,
     "function": 6,
     "predictions": 6,
     "package": 3,
@@ -46,7 +46,10 @@ def test_a_few_faults(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(ROWS.keys() - QUICK.keys()))
 @pytest.mark.filterwarnings("ignore")
 def test_a_few_slow_faults(name: str) -> None:
-    drawn = [outcome(ROWS[name].trial, seed) for seed in range(2)]
+    drawn = [outcome(ROWS[name].trial, seed) for seed in range(6 if name == "exported" else 2)]
+    for one in drawn:
+        if one.kind == "skipped":
+            pytest.skip(one.words)
     assert not [one for one in drawn if one.failed], table({name: drawn})
 
 

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
+import pytest
+
 from shipid.cli import error_line
 
 HANG = 20.0  # s of processor or wall time that no trial may take
@@ -24,8 +26,8 @@ MEMORY = 12 << 30  # bytes of address space of a trial
 class Outcome:
     """How a trial ended.
 
-    kind : `sound` (accepted, or mended), `refused` (one line), or a failure: `traceback`, `hang`, `died`, and what a
-        trial says itself.
+    kind : `sound` (accepted, or mended), `refused` (one line), `skipped` (this machine lacks what it needs), or a
+        failure: `traceback`, `hang`, `died`, and what a trial says itself.
     """
 
     trial: int
@@ -35,7 +37,7 @@ class Outcome:
     @property
     def failed(self) -> bool:
         """Whether the product has failed."""
-        return self.kind not in ("sound", "refused")
+        return self.kind not in ("sound", "refused", "skipped")
 
 
 class Failure(Exception):
@@ -53,21 +55,23 @@ def outcomes(work: Callable[[int], Any], seeds: Sequence[int], limit: float = HA
         process.start()
         there.close()
         begun = time.monotonic()
-        while left:
-            try:
-                waiting = here.poll(max(0.0, begun + limit - time.monotonic()))
-                end = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
-            except EOFError:
-                process.join()
-                end = Outcome(left[0], "died", f"exit code {process.exitcode}")
-            begun = time.monotonic()
-            left.pop(0)
-            yield end
-            if end.kind in ("hang", "died"):
-                break
-        process.kill()
-        process.join()
-        here.close()
+        try:
+            while left:
+                try:
+                    waiting = here.poll(max(0.0, begun + limit - time.monotonic()))
+                    end = here.recv() if waiting else Outcome(left[0], "hang", f"more than {limit:g} s")
+                except EOFError:
+                    process.join()
+                    end = Outcome(left[0], "died", f"exit code {process.exitcode}")
+                begun = time.monotonic()
+                left.pop(0)
+                yield end
+                if end.kind in ("hang", "died"):
+                    break
+        finally:
+            process.kill()
+            process.join()
+            here.close()
 
 
 def _serve(pipe: Connection, work: Callable[[int], Any], seeds: Sequence[int]) -> None:
@@ -89,6 +93,8 @@ def outcome(work: Callable[[int], Any], seed: int) -> Outcome:
             return Outcome(seed, "traceback", _short(error))
         good = all(part.isprintable() for part in line.split("\n")) and len(line) < 3000
         return Outcome(seed, "refused" if good else "no line", line)
+    except pytest.skip.Exception as reason:
+        return Outcome(seed, "skipped", str(reason))
     except BaseException as error:
         return Outcome(seed, "traceback", _short(error))
     return Outcome(seed, "sound")

@@ -398,13 +398,17 @@ def test_segments_say_their_file_and_do_not_overlap_in_it(
 
 @pytest.mark.parametrize("name", ["N", "u", "rot", "rpm", "heading"])
 @pytest.mark.parametrize("value", [1e300, -(2.0**64)])
+@pytest.mark.parametrize("estimated", [False, True])
 def test_a_value_that_no_ship_has_is_refused_with_its_row(
-    name: str, value: float, log: pd.DataFrame, plain_mapping: Callable[[str], Path], tmp_path: Path
+    name: str, value: float, estimated: bool, log: pd.DataFrame, plain_mapping: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Before, it was imported, and what followed ended in an overflow."""
+    """Before, it was imported, and what followed ended in an overflow; the estimate of a velocity, too."""
     log.loc[40, name] = value
+    sway, names = '[columns.v]\nfrom = "v"\nunit = "m/s"\n', ("position", "heading_deg", "velocity", "rate_deg")
+    noise = "".join(f"{one} = 0.1\n" for one in (*names, "acceleration", "angular_acceleration_deg"))
+    more = (f"[estimate]\n{noise}", (sway, "")) if estimated else ()
     with pytest.raises(DataError, match=r"row 41: .* no ship has more than"):
-        import_written(plain_mapping(""), log, tmp_path)
+        import_written(plain_mapping(*more), log, tmp_path)
 
 
 def test_a_spike_that_is_mended_is_no_such_value(
