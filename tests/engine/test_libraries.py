@@ -70,7 +70,6 @@ def made(folder: Path) -> Path:
 def compiled() -> bytes:
     """The library of `SOURCE`, as `build_library` leaves it."""
     command = find_compiler()
-    assert command is not None
     with TemporaryDirectory() as folder:
         library = Path(folder) / "model.so"
         build_library(native._compiler_command(command, CompilerTarget(1)), SOURCE, library)
@@ -238,5 +237,4 @@ def test_what_a_compiler_leaves_running_is_not_waited_for() -> None:
 
 def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     reason, _ = run_compiler([str(tmp_path / "none")])
-    assert reason is not None
     assert reason.startswith("cannot be started")

@@ -130,9 +130,8 @@ def test_chance_drives_nothing(members: int) -> None:
     ],
 )
 def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
-    with pytest.raises(DocumentError, match=remedy) as caught:
+    with pytest.raises(DocumentError, match=remedy):
         drawn_families(plan, name)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
