@@ -39,8 +39,6 @@ from shipid.study.schema import Data
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
 
-ROOT = Path(__file__).parents[2]
-
 
 @pytest.mark.parametrize(
     ("name", "foundations", "alone", "batches"),
