@@ -77,7 +77,7 @@ print(list(on_workers(partial(max, bytes({size})), [b"1"], 1)))
 """
     (tmp_path / "program.py").write_text(program)
     command = [sys.executable, tmp_path / "program.py"]
-    process = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    process = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     place = f"shipid.errors.ShipidError: {tmp_path / 'program.py'}: "
     assert process.stderr.splitlines()[-1].startswith(f"{place}each worker imports your script: put what it does below")
     assert process.stderr.count("Traceback") == 1
@@ -168,7 +168,7 @@ except KeyboardInterrupt:
                 os.killpg(process.pid, sent)
             else:
                 process.kill()
-            out, err = process.communicate(timeout=60)
+            out, err = process.communicate(timeout=600)
         assert out == (b"interrupted\n" if sent == signal.SIGINT else b"")
         assert b"Traceback" not in err
         assert sent == signal.SIGKILL or not err
