@@ -37,6 +37,7 @@ from shipid.study.prepare import obtain_runs, prepare
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.strangers import stranger
+from tests.strangers_ships import options_of
 
 OLD, NEW = "path-drawn", "kernel"
 FOLDS = {OLD: 0, NEW: 1}  # 0: as drafted, in thirds from six runs on; 1: every run is left out in its turn
@@ -52,7 +53,7 @@ def draw_log(seed: int, folder: Path) -> tuple[str, str, Path]:
     if seed % SEAS:
         ship = stranger(seed, runs)
         vessel = folder / "ship.toml"
-        command = [sys.executable, "-m", "shipid", "vessel", "new", *ship.options, "--out", str(vessel)]
+        command = [sys.executable, "-m", "shipid", "vessel", "new", *options_of(ship.known), "--out", str(vessel)]
         subprocess.run(command, check=True, capture_output=True)
         write_dataset(ship.dataset, log)
         return f"{ship.words}, {runs} runs", str(vessel), log

@@ -35,6 +35,7 @@ from shipid.vessel.stability import service_shaft
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.strangers import stranger
+from tests.strangers_ships import options_of
 
 BUNDLED = {  # that is left out: its variants, propulsor, shafts
     "gunnerus-33.9": ("gunnerus", "azimuth", 2),
@@ -85,7 +86,7 @@ def log_of(ship: str, folder: Path) -> tuple[str, Sequence[str], str, list[str]]
         dataset, words = obtain_runs(plan), load_vessel(ship).name
     else:
         drawn = stranger(int(ship), LOG_RUNS)
-        options, dataset, words = drawn.options, drawn.dataset, drawn.words
+        options, dataset, words = options_of(drawn.known), drawn.dataset, drawn.words
     write_dataset(dataset, folder / "log.parquet")
     return words, options, BUNDLED.get(ship, ("",))[0], list(dataset.runs)
 

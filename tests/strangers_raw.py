@@ -18,12 +18,18 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
-from shipid.simulation.approach import Controls
-from shipid.simulation.standard import shaft_speed
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, check_document
-from tests.strangers import TRIES
-from tests.strangers_ships import Random, Run, draw_ship, known_of, programme_of, record_of, sails, true_values
+from shipid.vessel.load import Vessel
+from tests.strangers_ships import (
+    Random,
+    Run,
+    candidates,
+    dataset_columns,
+    known_of,
+    programme_of,
+    record_of,
+    true_values,
+)
 from tests.strangers_words import CODES, DATES, GERMAN, IDLE, JOINED, LANGUAGES, ROLES, SIDES, SPELLED, UNITS, WORDS
 
 Array = NDArray[np.float64]
@@ -99,36 +105,18 @@ class RawStranger:
     record: pd.DataFrame
     kinds: Mapping[str, str]
 
-    @property
-    def options(self) -> list[str]:
-        """What is known, as options of the command line."""
-        return [word for name, value in self.known.items() for word in _option(name, value)]
-
-
-def _option(name: str, value: float | str | bool) -> tuple[str, ...]:
-    if value is True:
-        return (f"--{name}",)
-    return (f"--{name}", f"{value:.6g}" if isinstance(value, float) else str(value))
-
 
 def raw_stranger(seed: int, folder: Path, runs: int | None = None) -> RawStranger:
     """Draw a ship, its team and its runs (12 to 30 unless given), and write the files into `folder`."""
     random = np.random.default_rng([seed, 1907])
-    for _ in range(TRIES):
-        drawn = draw_ship(random)
+    for drawn, vessel, n in candidates(random, f"stranger-raw-{seed}.toml"):
+        style = _style(random, drawn)
+        programme = programme_of(random, int(random.integers(12, 31)), style)[:runs]
         try:
-            vessel = check_document(drawn["document"], f"stranger-raw-{seed}.toml")
-            n = shaft_speed(Controls(vessel), drawn["U"])
-            if not sails(vessel, n, drawn):
-                continue
-            style = _style(random, drawn)
-            programme = programme_of(random, int(random.integers(12, 31)), style)[:runs]
             record, starts = record_of(random, vessel, n, drawn, style, programme)
         except ShipidError:
             continue
         break
-    else:
-        raise AssertionError(f"no ship of seed {seed} goes straight and turns")
     columns = _headers(random, _channels(random, drawn, style, record), style)
     folder.mkdir(parents=True, exist_ok=True)
     files = _write(random, folder, style, columns, record, programme, starts)
@@ -138,19 +126,12 @@ def raw_stranger(seed: int, folder: Path, runs: int | None = None) -> RawStrange
         (folder / str(random.choice(["readme.txt", "NOTES.txt", "README.md"]))).write_text("\n".join(text) + "\n")
     measured = {column.signal for column in columns}
     known = known_of(random, drawn, n)
-    dropped = [name for name in record if str(name) not in _dataset_columns(record, measured)]
-    dataset = Dataset(record.drop(columns=dropped), {"clock": "run", "flags": []})
+    kept = dataset_columns(record, wind=bool({"wind_from", "awa"} & measured))
+    dataset = Dataset(record[[name for name in record if name in kept]], {"clock": "run", "flags": []})
     kinds = dict(zip(dataset.runs, (run.kind for run in programme), strict=True))
     return RawStranger(
         seed, folder, drawn["words"], known, notes, style, files, tuple(columns), vessel, dataset, record, kinds
     )  # fmt: skip
-
-
-def _dataset_columns(record: pd.DataFrame, measured: Iterable[str]) -> list[str]:
-    states = ["run", "t", "north", "east", "psi", "u", "v", "r", "flags"]
-    wind = ["V_w", "beta_w"] if {"wind_from", "awa"} & set(measured) else []
-    return [*states, *wind, *(name for name in map(str, record) if name.endswith((".n", ".delta", ".alpha"))
-            and not name.startswith("actual."))]  # fmt: skip
 
 
 def _one(random: Random, words: str, by: str = "|") -> str:

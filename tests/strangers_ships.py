@@ -6,7 +6,7 @@ changes with the tide, gusts, and a programme of tests with what instruments cou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Literal
@@ -16,6 +16,8 @@ import pandas as pd
 import pymap3d
 from numpy.typing import NDArray
 
+from shipid.errors import ShipidError
+from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import (
     CrashStop,
     Excitation,
@@ -27,10 +29,10 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.standard import shaft_speed
 from shipid.simulation.weather import Gusts, gust_series
 from shipid.units import RPM
-from shipid.vessel.load import Vessel
-from tests.strangers import TURN, _hull, _plain, _thrusters, _wetted, _wind
+from shipid.vessel.load import Vessel, check_document
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
@@ -48,6 +50,8 @@ TYPES: dict[str, tuple[tuple[float, float], ...]] = {  # L [m], C_b, L/B, B/T, F
 OPTION = {"bulk": "cargo", "coaster": "cargo"}  # word of `--ship-type`, where it is another
 MERCHANT = ("tanker", "bulk", "container", "coaster", "fishing")
 DRIVES = ("screw", "screw and tunnel", "twin screw", "azimuth")
+TRIES = 40  # ships are drawn until one goes straight and turns
+TURN = (1.4, 9.0)  # lengths across: tactical diameter of a ship that is taken
 RACE = ("race", "polynomial", "coefficients")
 
 
@@ -124,6 +128,117 @@ def draw_ship(random: Random) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _plain(values: Any) -> Any:
+    """Numbers as TOML has them."""
+    if isinstance(values, dict):
+        return {key: _plain(value) for key, value in values.items()}
+    return float(values) if isinstance(values, np.floating) else values
+
+
+def _wetted(size: Mapping[str, float]) -> float:
+    return size["L"] * (1.8 * size["T"] + size["C_b"] * size["B"])
+
+
+def _wind(size: Mapping[str, float], f: Any) -> dict[str, Any]:
+    L, B = size["L"], size["B"]
+    return {
+        "kind": "blendermann", "C_Dt": f(0.7, 0.95), "C_Dl_bow": f(0.5, 0.8), "C_Dl_stern": f(0.5, 0.8),
+        "delta": f(0.4, 0.7), "kappa": f(1.1, 2.0), "A_FW": 0.7 * B**2 * f(), "A_LW": 0.45 * L * B * f(),
+        "L_oa": 1.04 * L, "s_L": L * f(-0.05, 0.05), "s_H": 0.25 * B,
+    }  # fmt: skip
+
+
+def _hull(kind: str, size: Mapping[str, float], lift: Mapping[str, float], R: float, f: Any) -> dict[str, Any]:
+    L, T, rho, U = size["L"], size["T"], size["rho"], size["U"]
+    if kind == "cubic":
+        more = {
+            "X_vv": -0.04 * f(),
+            "X_vr": 0.01 * f(-2, 2),
+            "X_rr": 0.01 * f(0, 1),
+            "Y_vvv": -1.5 * f(),
+            "Y_vvr": 0.3 * f(0, 1),
+        }
+        more |= {
+            "Y_vrr": -0.4 * f(),
+            "N_vvv": -0.03 * f(),
+            "N_vvr": -0.3 * f(),
+            "N_vrr": 0.05 * f(),
+            "N_rrr": -0.013 * f(),
+        }
+        return {"mmg": {"R_0": R / (0.5 * rho * L * T * U**2), **lift, **more}}
+    unit = 0.5 * rho * L * T
+    derivatives = {
+        "X_u|u|": -0.7 * R / U**2, "X_uuu": -0.3 * R / U**3, "X_vr": unit * L * 0.02 * f(-1, 1),
+        "Y_uv": unit * lift["Y_v"] * 0.8, "Y_ur": unit * L * lift["Y_r"],
+        "N_uv": unit * L * lift["N_v"], "N_ur": unit * L**2 * lift["N_r"],
+    }  # fmt: skip
+    return {
+        "derivatives": derivatives,
+        "crossflow": {"strips": 12, "C_d": f(0.6, 1.1), "x_aft": -L / 2, "x_fwd": L / 2},
+    }
+
+
+def _thrusters(drive: str, rudder: str, size: Mapping[str, float], f: Any, R: float) -> dict[str, Any]:
+    L, B, T, quick = size["L"], size["B"], size["T"], size["quick"]
+    gear = {"kind": "first_order", "T": f(0.3, 1.2) / quick, "rate": np.radians(f(2.3, 5.0)) * quick}
+    shaft = {"kind": "first_order", "T": f(2.0, 6.0) / quick, "rate": 1e3}
+    if drive == "azimuth":
+        turned = {"kind": "first_order", "T": f(0.4, 1.2) / quick, "rate": np.radians(f(8, 15)) * quick}
+        D = f(0.45, 0.65) * T
+        unit = {
+            "kind": "azimuth", "x": -0.45 * L, "z": 0.7 * T, "D_p": D, "k_T": f(0.7, 1.0), "k_astern": f(0.6, 0.8),
+            "J_t": 0.06, "J_min": -0.3, "J_max": 1.3, "Jy_max": 0.6,
+            "k_over": 0.5, "k_over2": 0.12, "k_under": 0.1, "k_side": 0.6, "k_sideJ": 0.4,
+            "K_x": {"1": f(0.5, 0.8), "J": -f(0.4, 0.6), "JJ": -f(0.0, 0.1), "yy": 0.3 * f()},
+            "K_y": {"y": -f(0.6, 1.2), "Jy": -f(0.3, 0.7)}, "actuator": {"n": shaft, "alpha": turned},
+        }  # fmt: skip
+        return {name: {**unit, "y": side * 0.25 * B} for side, name in ((-1, "port"), (1, "starboard"))}
+    sides = ((-1, "port"), (1, "starboard")) if drive == "twin screw" else ((0, ""),)
+    D = f(0.45, 0.7) * T * (0.8 if len(sides) == 2 else 1.0)
+    wake = f(0.2, 0.4) if len(sides) == 1 else f(0.05, 0.15)
+    pitch = f(0.65, 1.1)
+    area = f(0.015, 0.022) * L * T / (1 if len(sides) == 1 else 1.6)
+    span = min(np.sqrt(f(1.3, 1.9) * area), 0.85 * T)
+    slope = 2 * np.pi / (1 + 2 * area / span**2)
+    blocks: dict[str, Any] = {}
+    fins = (f(0.3, 0.55), f(0.3, 0.55), f(0.9, 1.15), f(0.45, 0.65), f(0.6, 0.9), f(0.2, 0.4))
+    for side, name in sides:
+        y = {"y": side * 0.2 * B}
+        blocks[name or "propeller"] = {
+            "kind": "propeller", "x": -0.47 * L, **y, "z": 0.65 * T, "D_p": D, "k_astern": 0.7,
+            "t_P": 0.12 + 0.2 * wake, "w_P0": wake, "C_1": 1.8, "C_2_plus": 1.4, "C_2_minus": 1.2,
+            "K_T": {"1": 0.44 * pitch - 0.02, "J": -0.29, "JJ": -0.12}, "actuator": {"n": shaft},
+        }  # fmt: skip
+        steered = f"{name}_rudder" if name else "rudder"
+        if rudder == "race":
+            blocks[steered] = {
+                "kind": "rudder", "behind": name or "propeller", "x": -0.5 * L, **y, "z": 0.6 * T,
+                "A_R": area, "H_R": float(span), "f_alpha": float(slope * 0.95), "epsilon": fins[2], "kappa": fins[3],
+                "gamma_R_plus": fins[0], "gamma_R_minus": fins[1], "ell_R": -fins[4] * L, "t_R": 0.3, "a_H": fins[5],
+                "x_H": -0.45 * L, "actuator": {"delta": gear},
+            }  # fmt: skip
+        else:
+            force = area / L**2 * slope * (1 + fins[5]) * fins[2] ** 2
+            odd = {"Y_delta": -force, "N_delta": 0.5 * force}
+            fin = {"Y_vdeltadelta": force, "N_vdeltadelta": -0.5 * force}  # less lift on a rudder that is over
+            blocks[steered] = {
+                "kind": "rudder_derivatives", "X_deltadelta": -0.7 * force, "X_udeltadelta": -1.4 * force, **odd, **fin,
+                **{f"{key[0]}_u{key[2:]}": 2 * value for key, value in odd.items()},
+                **{f"{key[0]}_uu{key[2:]}": value for key, value in odd.items()}, "actuator": {"delta": gear},
+            }  # fmt: skip
+    if drive == "screw and tunnel":
+        push = 0.15 * R
+        blocks["bow"] = {
+            "kind": "tunnel",
+            "x": 0.38 * L,
+            "z": 0.6 * T,
+            "F_1": 0.0,
+            "F_2": push / 25.0 / quick**2,
+            "F_3": 0.0,
+        }
+    return blocks
+
+
 def _shape(kind: str, size: Mapping[str, Any], lift: Mapping[str, float], R: float, f: Any) -> dict[str, Any]:
     """Hull forces; Abkowitz: the cubic's terms about the service speed, their lift with the speed, resistance apart."""
     terms = _hull("cross-flow" if kind == "cross-flow" else "cubic", size, lift, R, f)
@@ -176,7 +291,7 @@ def _steering(thruster: dict[str, Any], rudder: str, size: Mapping[str, Any], f:
         thruster[name]["actuator"] = {"delta": gear | limits}
 
 
-def sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:
+def _sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:
     """Whether it turns at 35 deg neither on the spot nor hardly, and a zigzag comes back; she may be unstable."""
     pace = drawn["L"] / drawn["U"]
     how: dict[str, Any] = {"n_rpm": 60 * n, "approach": "helmsman"}
@@ -184,6 +299,20 @@ def sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:
     across = (turn["east"].max() - turn["east"].min()) / drawn["L"]
     zigzag = perform_manoeuvres(vessel, [Zigzag(angle_deg=20, duration=20 * pace, **how)], step=pace / 40)
     return bool(TURN[0] < across < TURN[1] and np.abs(zigzag["psi"]).max() < np.radians(80))
+
+
+def candidates(random: Random, name: str) -> Iterator[tuple[dict[str, Any], Vessel, float]]:
+    """Ships that go straight and turn: how each was drawn, the vessel, and its shaft speed [rev/s] at U."""
+    for _ in range(TRIES):
+        drawn = draw_ship(random)
+        try:
+            vessel = check_document(drawn["document"], name)
+            n = shaft_speed(Controls(vessel), drawn["U"])
+            if _sails(vessel, n, drawn):
+                yield drawn, vessel, n
+        except ShipidError:
+            continue
+    raise AssertionError(f"no ship of {name} goes straight and turns")
 
 
 def known_of(random: Random, drawn: Mapping[str, Any], n: float) -> dict[str, float | str | bool]:
@@ -217,6 +346,12 @@ def known_of(random: Random, drawn: Mapping[str, Any], n: float) -> dict[str, fl
     share = float(random.choice([0.25, 0.55, 0.9]))
     first = ("speed", "rpm", "scale", "propeller-diameter")  # what most of them know
     return known | {key: value for key, value in more.items() if random.random() < share + 0.3 * (key in first)}
+
+
+def options_of(known: Mapping[str, float | str | bool]) -> list[str]:
+    """What people know, as options of the command line."""
+    texts = {name: f"{value:.6g}" if isinstance(value, float) else str(value) for name, value in known.items()}
+    return [word for name, text in texts.items() for word in ([f"--{name}"] if text == "True" else [f"--{name}", text])]
 
 
 def programme_of(random: Random, count: int, style: Mapping[str, Any]) -> list[Run]:
@@ -368,3 +503,10 @@ def true_values(frame: pd.DataFrame, signal: str, at: float = 0.0) -> Array:
         "vn": u * np.cos(psi) - v * np.sin(psi), "ve": u * np.sin(psi) + v * np.cos(psi),
     }  # fmt: skip
     return np.asarray(computed.get(signal, frame.get(signal, 0.0)))
+
+
+def dataset_columns(record: pd.DataFrame, *, wind: bool) -> list[str]:
+    """Names of the columns of a record that a dataset has: what was ordered, not what was reached."""
+    orders = [name for name in map(str, record) if name.endswith((".n", ".delta", ".alpha"))]
+    kept = ["run", "t", "north", "east", "psi", "u", "v", "r", "flags", *(["V_w", "beta_w"] if wind else [])]
+    return [*kept, *(name for name in orders if not name.startswith("actual."))]

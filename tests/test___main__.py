@@ -14,7 +14,7 @@ from shipid.version import __version__
 
 def python_m(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "shipid", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
 
 
 def test_the_package_runs_as_the_command() -> None:
@@ -41,7 +41,7 @@ def test_ctrl_c_before_the_first_line_of_the_command_ends_quietly(stage: str) ->
         f"if {stage!r} != 'shipid.cli': unittest.mock.patch({stage!r}, side_effect=KeyboardInterrupt).start()\n"
         "m.run_command_line()"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600, check=False)
     assert (result.returncode, result.stderr) == (130, "interrupted\n")
 
 
@@ -52,6 +52,6 @@ def test_signs_that_a_terminal_does_not_know_are_written_out(encoding: str, show
     vessel.write_text('base = "gunnerus-28.9"\nname = "\u8239"\n', encoding="utf-8")
     command = [sys.executable, "-m", "shipid", "vessel", "show", str(vessel)]
     environment = os.environ | {"PYTHONIOENCODING": encoding, "FORCE_COLOR": "1", "COLUMNS": "40"}
-    result = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=False)
+    result = subprocess.run(command, env=environment, capture_output=True, timeout=600, check=False)
     assert (result.returncode, result.stderr) == (0, b"")
     assert shown in result.stdout

@@ -190,7 +190,6 @@ def test_a_truth_draws_the_depth_of_each_run_and_logs_it(depth: Vessel) -> None:
 def test_a_guess_and_the_importer_take_the_depth(tmp_path: Path) -> None:
     as_bridge(si_log()).assign(**{"Water depth [m]": 12.5}).to_csv(tmp_path / "log.csv", index=False)
     proposal = guess(tmp_path / "log.csv").column("depth")
-    assert proposal is not None
     assert (proposal.source, proposal.unit) == ("Water depth [m]", "m")
     log = pd.read_csv(as_log(turning(T), tmp_path / "plain.csv")).assign(d=1250.0)
     mapping = PLAIN.read_text() + '[columns.depth]\nfrom = "d"\nunit = "cm"\n'

@@ -337,7 +337,6 @@ def test_a_mistake_in_a_method_of_a_user_has_its_place(made: Callable[[Any], Any
     lines = Path(__file__).read_text().splitlines()
     line = lines[int(re.search(r"line (\d+)", str(caught.value))[1]) - 1]  # type: ignore[index]
     assert any(part in line for part in ("np.zeros(3)", "{}[", "sys.exit", "1 / len", "mean_of_all", "first"))
-    assert "\n" not in str(caught.value)
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,6 @@ class Page(HTMLParser):
 
 def load(file: Path) -> ModuleType:
     spec = spec_from_file_location(file.stem, file)
-    assert spec is not None
-    assert spec.loader is not None
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

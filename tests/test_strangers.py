@@ -13,7 +13,7 @@ from tests.benchmarks.strangers import true_dataset
 from tests.strangers import Stranger, stranger
 from tests.strangers_raw import RawStranger, raw_stranger
 
-SEED = 104  # a model with another rudder law, of which the template knows nothing
+SEED = 102  # a model with another rudder law, of which the template knows nothing
 
 
 @pytest.fixture(scope="module")

@@ -97,7 +97,6 @@ A = {f"m{k}": 2.0**k for k in range(5)}
 def test_break_even_by_hand() -> None:
     """H = A / 2 meets 3 m at A = 6 m."""
     worth = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [3.0]}, (10,)), list(A), 0)
-    assert worth is not None
     assert worth.value == pytest.approx(6.0)
     assert worth.low < 6.0 < worth.high
     assert not any((worth.above, worth.below))
@@ -111,7 +110,6 @@ def test_a_limit_of_A_reaches_as_far_as_that_of_the_mean_error_of_unequal_manoeu
     alone, trained = {m: a * hard for m, a in A.items()}, {m: a / 2 * hard for m, a in A.items()}
     H = {name: values[None, None] for name, values in {**trained, "none": 2.1 * hard}.items()}
     worth = break_even(ErrorTable((10,), np.ones(runs), alone, H), list(A), 0)
-    assert worth is not None
     assert worth.value == pytest.approx(4.2 * hard.mean())
     wide = stats.t.ppf(0.975, runs - 1) * np.log(hard).std(ddof=1) / runs**0.5
     least, most = worth.limits
@@ -129,7 +127,6 @@ def test_break_even_never_disagrees_with_what_is_shown_of_a_model(seed: int) -> 
     H["none"] = [2.0 * hard * rng.lognormal(0.0, 0.3, (4, runs)) * rng.lognormal(0.0, 0.2, (4, 1))]
     errors = ErrorTable((10,), np.ones(runs), {m: a * hard for m, a in A.items()}, H, 100)
     worth, lead = break_even(errors, list(A), 0), errors.lead("none", list(A), 0)
-    assert worth is not None
     for k, m in enumerate(A):
         assert errors.mean(m, PHYSICS_ONLY) >= worth.low or lead.above[k] <= SIGNIFICANT
         assert errors.mean(m, PHYSICS_ONLY) <= worth.high or lead.below[k] <= SIGNIFICANT
@@ -144,14 +141,12 @@ def test_one_bad_model_does_not_bend_the_limit(seed: int) -> None:
     none = float(rng.uniform(H[0], H[-2]))
     worth = break_even(table(A, {m: [h] for m, h in zip(A, H, strict=True)} | {"none": [none]}, (10,)), list(A), 0)
     last = max(2.0**k for k, h in enumerate(H) if h < none)
-    assert worth is not None
     assert last <= worth.value <= 2 * last
 
 
 @pytest.mark.parametrize(("none", "where"), [(100.0, "above"), (0.01, "below")])
 def test_break_even_beyond_the_models_tried_is_a_bound(none: float, where: str) -> None:
     worth = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [none]}, (10,)), list(A), 0)
-    assert worth is not None
     assert getattr(worth, where)
     assert worth.value == {"above": 16.0, "below": 1.0}[where]
 
@@ -162,7 +157,6 @@ def test_where_accuracy_does_not_pay_all_models_serve_or_none_does(none: float, 
     worth = break_even(
         table(A, {m: [gain**k] for k, m in enumerate(A)} | {"none": [none * gain**2]}, (10,)), list(A), 0
     )
-    assert worth is not None
     assert worth.value == value
 
 
@@ -207,7 +201,6 @@ def test_exact_physics_pays_and_no_data_replace_it() -> None:
     H = {name: (value, value / 2) for name, value in exact.items()}
     errors = table(exact, {**H, "none": (9.0, 4.0)}, (10, 30))
     limit = break_even(errors, list(exact), 0)
-    assert limit is not None
     assert limit.above
     assert runs_without_physics(errors, "m0", 0).above
     assert runs_without_physics(table(exact, {**H, "none": (9.0, 0.0)}, (10, 30)), "m0", 0).value == 30

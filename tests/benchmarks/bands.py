@@ -78,7 +78,6 @@ def cell(made: World, runs: Sequence[str], method: Method, physics: Physics, see
     bands = calibrate_bands(
         fitted.left_out, windows.future, windows.run, windows.columns, names, windows.step, made.kinds
     )
-    assert bands is not None
     inside = windows.future - fitted.corrector.predict(physics, windows.instants(), alone)
     spread = None
     if isinstance(fitted.corrector, Compensator):
@@ -264,7 +263,6 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
         turn = replace(plan, study=study, batches=(Batch(amount, 0),))
         prepared = prepare(turn, dataset)
         for row, predictor, _ in run_unit(turn, prepared, whole_unit(turn, turn.batches[0]), "cpu"):
-            assert predictor is not None
             instants = instants_of(turn.study, predictor.vessel, dataset, prepared.test)
             model = model_label(plan, row["foundation"], row["method"])
             frame = pd.DataFrame({"test": test, "model": model, "H": row["H"]},

@@ -16,7 +16,7 @@ from tests.benchmarks.timing import best_of
 from tests.hybrid.tasks import tune
 
 ORDER = 2048  # of the big matrices
-MODELS, RUNS, WINDOWS, HORIZON, INPUTS = 20, 50, 50, 30, 7  # a batch of experiment 1 at N_D = 50
+MODELS, RUNS, WINDOWS, HORIZON = 20, 50, 50, 30  # a batch of experiment 1 at N_D = 50
 REPEAT = 200  # of small work, so that a clock can tell
 TRIALS = 4
 METHOD = PathDrawn(trials=TRIALS, mirror=1.0, ridge=1.0, search_windows=RUNS * WINDOWS)

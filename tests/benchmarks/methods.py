@@ -51,7 +51,6 @@ def tune_cell(plan: Plan, prepared: PreparedStudy, cell: Cell, method: Method) -
     start = time.process_time()
     fit = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
     seconds = time.process_time() - start
-    assert fit.corrector is not None
     instants = instants_of(plan.study, vessel, prepared.data, prepared.test)
     paths = fit.corrector.predict(physics, instants, prepared.known[cell.model].test_paths)
     error = summarise_errors(position_error(paths, prepared.test.future))

@@ -36,6 +36,7 @@ from shipid.study.results import read_results
 from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw
 from tests.strangers_raw import RawStranger, raw_stranger
+from tests.strangers_ships import options_of
 from tests.study.tiny import run_here
 
 FIRST, SHIPS = 20261122, 12
@@ -150,7 +151,7 @@ def one(seed: int, folder: Path, whole: bool = False) -> dict[str, Any]:
 
 def _to_the_study(ship: RawStranger, desk: Desk) -> list[str]:
     """Draft, import, check, vessel, study; returns the warnings about the vessel."""
-    desk.type("vessel", "vessel", "new", *ship.options, "--out", "ship.toml")
+    desk.type("vessel", "vessel", "new", *options_of(ship.known), "--out", "ship.toml")
     drafting = ("data", "import", "--guess", "raw", "--vessel", "./ship.toml", "--json", "--out")
     asked = desk.type("draft", *drafting, "log.toml")["questions"]
     desk.questions += asked

@@ -19,8 +19,6 @@ COUNTS = (120, 1200)
 def run() -> dict[str, Any]:
     """Wall time [s] of all manoeuvres in one call, and of the first call, which compiles."""
     plan = read_plan("simulation")
-    assert plan.truth is not None
-    assert plan.study.truth is not None
     vessel, declared = plan.truth, plan.study.truth
 
     def simulated(count: int) -> Any:

@@ -38,4 +38,4 @@ def ended(*arguments: object) -> tuple[object, str, str]:
 def shell(*arguments: object, code: str = "from shipid.cli import main; main()") -> subprocess.CompletedProcess[str]:
     """Run the command as a user would, in a new process."""
     command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import threading
 
 import pytest
 
@@ -44,9 +44,15 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
     from shipid.cli import terminal
 
     monkeypatch.setattr(terminal, "SILENCE", 0.02)
-    looks = iter(["", "trial 1", "trial 2"])
-    with terminal.show_steps(look=lambda: next(looks, "trial 2")):
-        time.sleep(0.3)
+    looks, done = iter(["", "trial 1", "trial 2", "trial 2"]), threading.Event()
+
+    def look() -> str:
+        if (word := next(looks, None)) is None:
+            done.set()
+        return "trial 2" if word is None else word
+
+    with terminal.show_steps(look=look):
+        assert done.wait(60)
     assert capsys.readouterr().err.splitlines() == ["trial 1", "trial 2"], "each once"
 
 

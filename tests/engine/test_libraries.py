@@ -70,7 +70,6 @@ def made(folder: Path) -> Path:
 def compiled() -> bytes:
     """The library of `SOURCE`, as `build_library` leaves it."""
     command = find_compiler()
-    assert command is not None
     with TemporaryDirectory() as folder:
         library = Path(folder) / "model.so"
         build_library(native._compiler_command(command, CompilerTarget(1)), SOURCE, library)
@@ -214,9 +213,9 @@ def test_what_a_strange_compiler_says_is_one_line_that_names_it_and_controls_no_
 
 def test_a_compiler_that_never_returns_is_ended_with_its_children(tmp_path: Path) -> None:
     child = tmp_path / "child"
-    reason, _ = run_compiler(["sh", "-c", f"sleep 600 & echo $! > {child}; wait"], limit=0.5)
-    assert reason == "hangs: not done after 0.5 s"
-    limit = time.monotonic() + 5.0
+    reason, _ = run_compiler(["sh", "-c", f"sleep 600 & echo $! > {child}; wait"], limit=2.0)
+    assert reason == "hangs: not done after 2 s"
+    limit = time.monotonic() + 60.0
     while _alive(int(child.read_text())) and time.monotonic() < limit:
         time.sleep(0.02)
     assert not _alive(int(child.read_text()))
@@ -233,10 +232,9 @@ def test_what_a_compiler_leaves_running_is_not_waited_for() -> None:
     """Such as a server that keeps its results: it holds the pipe of what is printed."""
     start = time.monotonic()
     assert run_compiler(["sh", "-c", "echo done; sleep 60 &"]) == (None, "done\n")
-    assert time.monotonic() - start < 10.0
+    assert time.monotonic() - start < 50.0
 
 
 def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     reason, _ = run_compiler([str(tmp_path / "none")])
-    assert reason is not None
     assert reason.startswith("cannot be started")

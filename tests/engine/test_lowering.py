@@ -15,7 +15,6 @@ from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Method, rollout
 from shipid.engine.torch import lower_function
 from shipid.simulation.weather import Sea, draw_components, wave_loads
-from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, draw_members
 from tests.conftest import structure
@@ -54,34 +53,6 @@ def by_casadi(function: ca.Function, inputs: dict[str, np.ndarray]) -> np.ndarra
     names = [function.name_in(i) for i in range(function.n_in())]
     width = next(iter(inputs.values())).shape[1]
     return np.hstack([np.array(function(*(inputs[name][:, k] for name in names))) for k in range(width)])
-
-
-def dynamics_inputs(vessel: Vessel, draw_inputs: Draw, width: int) -> dict[str, np.ndarray]:
-    given, model = draw_inputs(vessel, width), vessel_dynamics(vessel)
-    rng = np.random.default_rng(1)
-
-    def stacked(names: Any, group: str) -> np.ndarray:
-        return np.array([given[group][name] for name in names]).reshape(len(names), width)
-
-    return {
-        "state": np.concatenate([stacked(model.state, "start"), rng.uniform(-0.5, 0.5, (len(model.hidden), width))]),
-        "memory": stacked(model.memory, "commands"),
-        "commands": stacked(model.commands, "commands"),
-        "environment": stacked(model.environment, "environment"),
-        "parameters": np.tile(np.array(list(vessel.parameters.values()))[:, None], (1, width)),
-        "tau_extra": rng.normal(size=(model.num_dof, width)) * 1e3,
-        "dt": np.full((1, width), 0.7),
-    }
-
-
-@pytest.mark.parametrize("name", ["rates", "advance"])
-def test_functions_of_every_vessel(vessel: Vessel, draw_inputs: Draw, name: str) -> None:
-    function = getattr(vessel_dynamics(vessel), name)
-    inputs = dynamics_inputs(vessel, draw_inputs, 16)
-    expected = by_casadi(function, inputs)
-    computed = evaluate(function, inputs)
-    scale = np.abs(expected).max(axis=1, keepdims=True, initial=0.0)
-    np.testing.assert_allclose(computed, expected, rtol=1e-12, atol=1e-12 * scale.max(initial=0.0))
 
 
 @pytest.mark.parametrize("method", ["euler", "rk4"])

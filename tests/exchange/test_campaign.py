@@ -38,7 +38,6 @@ def test_the_study_of_a_ship_has_its_own_sizes(name: str) -> None:
     ship = studied_ship(name, SEED, DRAWN)
     plan = plan_ship(ship, SEED, DRAWN, AMOUNTS)
     truth, ahead = plan.study.truth, plan.study.prediction
-    assert truth is not None
     U, L = ship.physics.document["particulars"]["U_0"], ship.physics.length
     assert ahead.ahead * 0.75 * U / L == pytest.approx(max(HORIZONS), rel=0.05)
     assert ahead.horizon % 4 == 0

@@ -142,10 +142,10 @@ def test_a_prediction_is_fast_small_and_allocates_nothing(tmp_path):
     recorder = Recorder(predictor, tmp_path)
     loaded = library(recorder.files, tmp_path / "fast", "-O1")
     recorder.follow(dataset.frame)
-    path, begun = np.zeros((30, 2)), time.perf_counter()
+    path, begun = np.zeros((30, 2)), time.process_time()
     for _ in range(100):
         assert loaded.odd_predict(pointer(recorder.kept), None, None, pointer(path), None) == 0
-    assert time.perf_counter() - begun < 0.1
+    assert time.process_time() - begun < 0.1
     objects = tmp_path / "fast" / "odd_casadi.o"
     assert objects.stat().st_size + len(recorder.kept) < 3e6
     calls = subprocess.run(["nm", "-u", objects, tmp_path / "fast" / "model.so"], capture_output=True, text=True)

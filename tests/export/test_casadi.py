@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -115,17 +114,6 @@ def test_a_point_of_the_training_has_derivatives():
     now = ca.MX.sym("now", exported.layout.sizes["now"])
     path = exported.function(**{**given, "now": now})["path"]
     assert np.isfinite(ca.Function("slopes", [now], [ca.jacobian(path, now)])(given["now"]).full()).all()
-
-
-def hybrid(horizon):
-    """A ship with networks at every step, whose plan is known: 10 s a step."""
-    predictor = drawn("one-step", 4, vessel="mariner").predictor
-    corrector = predictor.corrector
-    heads = tuple(replace(h, surge=0.1 * h.surge, sway_yaw=0.005 * h.sway_yaw) for h in corrector.heads)
-    physics = Physics(load_vessel("mariner"), horizon, 10.0, "rk4")
-    return replace(
-        predictor, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None, alarm=None
-    )
 
 
 @pytest.mark.slow

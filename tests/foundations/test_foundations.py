@@ -173,7 +173,6 @@ def test_a_study_has_the_digits_of_a_task_by_hand(tmp_path: Path) -> None:
         folds = prepared.folds(part, mine, way.method.validation)
         task = shipid.Task({"short": shipid.Case(none, before)}, mine, folds, prepared.commands, seed=part.seed)
         corrector = way.method.fit(task)["short"].corrector
-        assert corrector is not None
         error = shipid.position_error(corrector.predict(none, prepared.test.instants(), after), prepared.test.future)
         (row,) = (row for row in results.rows if row["cell"] == part.cell("short", way.name))
         assert row["H"] == pytest.approx(error.mean(), rel=1e-9)

@@ -29,7 +29,6 @@ class Runs:
         errors, paths = scale * self.errors[:, chosen], scale * self.paths[:, chosen]
         columns = {name: values[chosen] * (scale if name == "u" else 1.0) for name, values in self.columns.items()}
         bands = calibrate_bands(errors, paths + errors, self.run[chosen], columns, NAMES, 1.0, self.kinds)
-        assert bands is not None
         return bands
 
 

@@ -5,7 +5,6 @@ import pytest
 import torch
 
 from shipid.hybrid.features import Inputs
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.training import StackTraining
 from tests.hybrid.tasks import compensation, tune
@@ -14,7 +13,6 @@ torch.set_num_threads(1)
 COMMANDS = ("port.n", "port.delta", "starboard.n", "starboard.delta")
 SMALL = PathTrained(trials=3, units=16, layers=1, learning_rate=1e-2, epochs=40, patience=0)
 SEARCHED = PathTrained(trials=3, epochs=6)
-DRAWN = PathDrawn(trials=3, units=32, terms=4)
 FOLD = (np.arange(40, 200), np.arange(40))
 
 

@@ -43,7 +43,6 @@ def test_what_the_physics_missed_before_is_what_it_missed_in_the_steps_before():
 
 
 def test_trials_that_would_have_no_effect_are_refused():
-    with pytest.raises(DocumentError, match=r"trials: each of `delays` is a trial: leave it out") as caught:
+    with pytest.raises(DocumentError, match=r"trials: each of `delays` is a trial: leave it out"):
         HankelDMD(trials=2)
-    assert "\n" not in str(caught.value)
     assert HankelDMD(budget=10.0).num_trials() is None

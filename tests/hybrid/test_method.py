@@ -47,9 +47,8 @@ def task(**options: object) -> Task:
 def test_a_fold_without_windows_is_refused(empty: int) -> None:
     fold = [np.arange(4), np.arange(4, 8)]
     fold[empty] = np.arange(0)
-    with pytest.raises(DataError, match="use more manoeuvres") as caught:
+    with pytest.raises(DataError, match="use more manoeuvres"):
         task(folds=[tuple(fold)])
-    assert "\n" not in str(caught.value)
 
 
 def test_inputs_without_physics_are_one_array_for_all() -> None:
@@ -118,9 +117,8 @@ def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
         def fit(self, given: Task) -> dict[str, FitResult]:  # noqa: ARG002
             return gives  # type: ignore[no-any-return]
 
-    with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}") as caught:
+    with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}"):
         fit_all(Mine(), task())
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("of", ["fit", "hyperparameters", "past"])
@@ -211,9 +209,8 @@ def shift(self: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG001
 def test_what_a_class_lacks_is_said_as_it_is_named(kind: type[Method], message: str) -> None:
     """It ended in a traceback, in the middle of a study."""
     said = message.replace("FILE", re.escape(__file__))
-    with pytest.raises(ShipidError, match=rf"^'mine' in shipid\.methods: {said}$") as caught:
+    with pytest.raises(ShipidError, match=rf"^'mine' in shipid\.methods: {said}$"):
         METHODS["mine"] = kind
-    assert "\n" not in str(caught.value)
 
 
 def test_what_a_corrector_lacks_is_said() -> None:

@@ -27,7 +27,6 @@ def drawn(seed: int, count: int, turns: float = 0.0) -> tuple[dict[str, Array], 
 
 def alarm_of(table: dict[str, Array], run: Array):
     alarm = calibrate_alarm(Inputs(ORDERS), 5, table, run)
-    assert alarm is not None
     return alarm
 
 

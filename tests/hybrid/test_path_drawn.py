@@ -82,7 +82,6 @@ def test_choose_takes_the_memory_that_validates_best(dataset: Dataset, group: st
     fit = method.fit(task(dataset, {"one": foundation}, target(dataset, foundation, group)))["one"]
     assert [row["params"]["memory"] for row in fit.trials] == [float(k % len(method.memories)) for k in range(15)]
     best = min(fit.trials, key=lambda row: row["value"])
-    assert fit.corrector is not None
     assert fit.corrector.hyperparameters == best["params"]
     assert group in MEMORIES[int(best["params"]["memory"])]
     without = [row["value"] for row in fit.trials if group not in MEMORIES[int(row["params"]["memory"])]]
@@ -113,7 +112,6 @@ def test_a_mirrored_trial_with_a_memory_answers_mirrored_runs_with_mirrored_path
     foundation = physics(Observer(), N_ur=-3e5)
     method = PathDrawn(**{**SMALL, "mirror": 1.0})
     corrector = method.fit(task(dataset, {"one": foundation}))["one"].corrector
-    assert corrector is not None
     assert corrector.hyperparameters["mirror"] == 1.0
     paths = []
     for data in (dataset, mirrored(dataset)):

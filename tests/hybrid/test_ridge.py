@@ -77,10 +77,6 @@ def tuned(columns, targets, setup, *, commands=TWINS, folds=FOLDS, seed=3):
     return tune(columns, commands, targets, folds, setup, seed)
 
 
-def predicted(fits, columns):
-    return {key: compensation(one.corrector, columns) for key, one in fits.items()}
-
-
 def part_of(side, features, targets):
     """A coordinate as the search holds it."""
     return _with_axes((side,), torch.tensor(features), [torch.tensor(targets)])

@@ -142,7 +142,6 @@ def ship() -> Vessel:
 
 def fitted(method: Method, world_: World, seed: int = 0) -> Corrector:
     fit = method.fit(world_.task(seed=seed))["physics"].corrector
-    assert fit is not None
     return fit
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,6 @@ from shipid.vessel.load import load_vessel
 from tests.drawn import seeds
 from tests.identification.linear import design, fitted, labels, linear_fit, noise
 from tests.identification.trials import noisy, trials
-
-Residuals = Callable[[np.ndarray], np.ndarray]
 
 
 @pytest.mark.parametrize("seed", seeds(2, 2))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -21,7 +20,6 @@ from shipid.vessel.load import load_vessel
 
 KNOT = 1852 / 3600
 FINE = 0.1  # s
-Change = Callable[[pd.DataFrame], pd.DataFrame]
 
 SCHEDULE = [  # seconds, rpm, azimuth [deg]
     *((120, 170, 0), (20, 170, -20), (40, 170, 20), (40, 170, -20), (40, 170, 20), (40, 170, -20), (20, 170, 20)),

@@ -20,7 +20,6 @@ from shipid.logs.workbook import WIDEST
 from tests.drawn import seeds
 from tests.logs.conftest import NAMES, assert_is_the_motion, mapping_with
 
-Write = Callable[..., Path]
 TEXTS: dict[str, tuple[str, Callable[[pd.DataFrame, Path], object]]] = {
     "tabs": ('separator = "\\t"', lambda f, p: f.to_csv(p, sep="\t", index=False)),
     "semicolons and decimal commas": (

@@ -27,7 +27,6 @@ def test_reaches_of_a_constant_deceleration(interval: float) -> None:
 
 def test_a_shaft_that_is_stopped_is_ordered_to_stop() -> None:
     record = every(stopped(), 0.5)
-    assert record.shaft is not None
     drifting = replace(record, shaft=np.maximum(record.shaft, 0.0))
     for name, one in stopping_measures(record).items():
         assert stopping_measures(drifting)[name].value == pytest.approx(one.value), name

@@ -38,22 +38,17 @@ def banded(simulation: ReportContent) -> ReportContent:
 
 def test_it_says_what_was_held(banded: ReportContent) -> None:
     figure = bands.coverage_figure(banded)
-    assert figure is not None
     words = "Bands of 90 % held 89 % of the whole test paths."
     told = replace(banded, answer=[AnswerSentence(words, "coverage")])
-    said = bands.coverage_figure(told)
-    assert said is not None
-    assert said.takeaway == words
+    assert bands.coverage_figure(told).takeaway == words
     assert len(views(figure)) == 3
     table = bands.coverage_table(banded)
-    assert table is not None
     assert "needs 9 runs" in table.takeaway
 
 
 def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) -> None:
     """Colours by A of two models of like accuracy cannot be told apart."""
     figure = bands.coverage_figure(banded)
-    assert figure is not None
     looks = {(chip.colour, chip.symbol) for chip in figure.chips}
     assert len(looks) == len(figure.chips)
     assert all(chip.symbol and "scale" not in chip.colour for chip in figure.chips)
@@ -63,10 +58,8 @@ def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) ->
 
 def test_the_map_of_the_width(banded: ReportContent) -> None:
     figure = bands.width_figure(banded)
-    assert figure is not None
     assert figure.takeaway.startswith("The mean radius of the band goes from ")
     least, most = banded.cells.groupby(["model", "N_D"]).width.mean().agg(["min", "max"])
-    assert figure.scale is not None
     assert (figure.scale.low, figure.scale.high) == (pytest.approx(least), pytest.approx(most))
 
 

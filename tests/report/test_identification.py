@@ -117,7 +117,6 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
     assert [row[0].text for row in errors.rows] == ["all held out", "all fitted", "test run", "fit run"]
     assert [cell.text for cell in errors.rows[0][2:4]] == ["1", "0.100"]
     table = identification.manoeuvres_before_and_after(content())
-    assert table is not None
     assert table.columns[-1] == "why missing"
     assert table.rows[1][-1].text == "before: no"
     assert "Extrapolated: turning 35 reaches 20 deg of drift; the data reach 13." in table.takeaway

@@ -76,7 +76,6 @@ def test_answer_counts_the_criteria_that_are_judged() -> None:
     for notes, words in ((["in ballast"] * 3, "met; in ballast."), (["in ballast", "", ""], "met.")):
         assert replace(shown, criteria=shown.criteria.assign(note=notes)).answer[1].text.endswith(words)
     table = motion.criteria_table(replace(shown, criteria=worse))
-    assert table is not None
     assert [row[4].bad for row in table.rows] == [False, True, False]
 
 
@@ -111,7 +110,6 @@ def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
         np.testing.assert_allclose(lines[name], values, rtol=1e-5, atol=1e-5, err_msg=name)
     if kind == "spiral":
         figure = motion.spiral_figure(shown)
-        assert figure is not None
         (trace,) = views(figure)[""][0].data
         for axis, column in (("x", "helm"), ("y", "rate")):
             np.testing.assert_allclose(trace[axis], np.degrees(shown.levels[column]), rtol=1e-5, atol=1e-6)

@@ -100,7 +100,6 @@ def test_the_vendored_plotly_is_the_one_that_is_recorded_and_draws_the_figures_o
     record = folder.joinpath("README.md").read_text(encoding="utf-8")
     assert hashlib.sha256(script).hexdigest() in record
     version = re.search(rb"plotly.js \(cartesian - minified\) v([0-9.]+)", script[:200])
-    assert version is not None
     assert f"plotly.js {version[1].decode()}" in record
     assert version[1].decode().partition(".")[0] == get_plotlyjs_version().partition(".")[0], "figures are made for it"
     assert b"</script" not in script

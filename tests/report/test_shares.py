@@ -35,7 +35,6 @@ def content() -> ReportContent:
 
 def test_what_is_told_and_what_cannot_be_told() -> None:
     figure = shares_figure(content())
-    assert figure is not None
     told, unknown = figure.takeaway.split(". few")
     assert told == "many with N_D = 30: hull.n_7 35.0% (25.0% to 45.0%)"
     assert unknown == " with N_D = 30: 3 members cannot tell; about 42 might: --set family.few.members=42."
@@ -43,7 +42,6 @@ def test_what_is_told_and_what_cannot_be_told() -> None:
 
 def test_the_largest_shares_are_drawn_with_their_intervals() -> None:
     figure = shares_figure(content())
-    assert figure is not None
     plot = views(figure)["0"][0]
     assert [trace.name for trace in plot.data] == ["N_D = 0", "N_D = 10", "N_D = 30"]
     assert [chip.label for chip in figure.chips] == [trace.name for trace in plot.data]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,9 +15,7 @@ import numpy as np
 from shipid.vessel.load import Vessel
 
 AXES = "XYZKMN"
-EVERY = tuple(range(6))
 SPEEDS = "uvwpqr"
-GRAVITY = 9.81
 HEAVE, ROLL, PITCH = 2, 3, 4
 UPRIGHT = (HEAVE, ROLL, PITCH)
 MIRROR = np.array([1, -1, 1, -1, 1, -1])
@@ -100,17 +98,11 @@ class Linear:
             F[i, j, axis] = columns[f"{name}_real"] + 1j * columns[f"{name}_imag"]
         return omega, all_round(F, MIRROR)
 
-    def response(self, omega: np.ndarray, beta: float, free: Sequence[int] = UPRIGHT, speed: float = 0.0) -> np.ndarray:
-        """Motions per metre of amplitude, (n, len(free)), in the directions that are free; the others are held.
-
-        At a speed ahead the excitation is that of the wave, the ship moves at the frequency of encounter.
-        """
-        met = omega - omega**2 / GRAVITY * speed * np.cos(beta)
-        square = np.ix_(range(len(omega)), free, free)
-        w = met[:, None, None]
-        system = -(w**2) * (self.M + self.A) + 1j * w * (self.memory(met) + self.B) + self.C
-        F = self.excitation(omega, beta)[:, list(free)]
-        return np.asarray(np.linalg.solve(system[square], F[..., None])[..., 0])
+    def response(self, omega: np.ndarray, beta: float) -> np.ndarray:
+        """Motions per metre of amplitude, (n, 6)."""
+        w = omega[:, None, None]
+        system = -(w**2) * (self.M + self.A) + 1j * w * (self.memory(omega) + self.B) + self.C
+        return np.asarray(np.linalg.solve(system, self.excitation(omega, beta)[..., None])[..., 0])
 
 
 def linear(vessel: Vessel) -> Linear:

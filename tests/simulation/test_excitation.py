@@ -104,12 +104,6 @@ def test_wrong_orders_are_refused(call: Any, message: str) -> None:
         call()
 
 
-def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:
-    """Hold times [s] of all levels but the last, which the end cuts."""
-    changes = np.flatnonzero(np.diff(series) != 0) + 1
-    return np.diff(np.concatenate([[0], changes])) * step
-
-
 def test_levels_fill_their_range_evenly() -> None:
     series = steps()
     levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]

@@ -1,4 +1,4 @@
-"""The truth in waves: periods, long waves, irregular seas against the linear ship, calm water, energy, step, mirror."""
+"""The truth in waves: periods, irregular seas against the linear ship, drift, calm water."""
 
 from __future__ import annotations
 
@@ -19,14 +19,12 @@ from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.simulation.linear import EVERY, HEAVE, PITCH, ROLL, UPRIGHT, linear
+from tests.simulation.linear import HEAVE, PITCH, ROLL, UPRIGHT, linear
 
 HULLS = ("gunnerus-28.9-6dof", "gunnerus-33.9-6dof")
 BOTH = pytest.mark.parametrize("name", HULLS)
 OF = {HEAVE: "down", ROLL: "phi", PITCH: "theta"}
 OFF = {f"thruster.{side}.off": True for side in ("port", "starboard")}
-HELD: dict[str, object] = {"added_mass.X_udot": -1e12, "added_mass.Y_vdot": -1e12, "added_mass.N_rdot": -1e14}
-HELD["unusual"] = ["added_mass.*"]
 LOW = Sea(H_s=0.1, T_p=5.0)  # linear: heading and path of a ship that no course keeper holds stay as they were
 ENGINE = "auto" if find_compiler() is None else "native"
 
@@ -41,13 +39,6 @@ def ship(name: str, thrust: bool = False) -> Vessel:
     """A bundled truth, adrift unless it has thrust."""
     vessel = load_vessel(name)
     return vessel if thrust else vessel.with_values(OFF)
-
-
-@cache
-def held(name: str) -> Vessel:
-    """The same with surge, sway and yaw held, by inertia: the other three directions keep theirs."""
-    coupled = [key for key in ("Y_rdot", "N_vdot") if key in ship(name).document["added_mass"]]
-    return ship(name).with_values({**HELD, **dict.fromkeys((f"added_mass.{key}" for key in coupled), 0.0)})
 
 
 def run(
@@ -160,12 +151,6 @@ def test_undamped_periods_are_those_of_the_data_base(name: str, axis: int) -> No
     assert 2 * np.pi / omega == pytest.approx(PERIODS[name][axis], rel=0.02 if exception else 0.01)
 
 
-def alone(name: str, axis: int) -> Vessel:
-    """Heave or pitch alone, the others held by inertia; roll with sway and yaw free, as the ship is."""
-    others = {HEAVE: {"added_mass.M_qdot": -1e15}, PITCH: {"added_mass.Z_wdot": -1e13}}
-    return ship(name) if axis == ROLL else held(name).with_values(others[axis])
-
-
 # ---- the linear ship
 
 
@@ -175,7 +160,7 @@ def test_equations_at_rest_are_the_linear_ship_of_the_document(name: str) -> Non
     omega, theory = np.linspace(0.4, 3.0, 14), linear(ship(name))
     for beta in (np.pi / 2, 2.4):
         response = linearised(ship(name)).response(omega, theory.excitation(omega, beta))
-        expected = theory.response(omega, beta, EVERY)
+        expected = theory.response(omega, beta)
         names = ("north", "east", "down", "phi", "theta", "psi")
         np.testing.assert_allclose(np.stack([response[key] for key in names], axis=-1), expected, rtol=1e-7, atol=1e-12)
 
@@ -234,9 +219,6 @@ def test_first_order_loads_do_not_drift_the_ship(name: str, beta_deg: int) -> No
     assert abs(mean) < 0.3 * abs(drift)
 
 
-# ---- long waves
-
-
 # ---- calm water
 
 
@@ -258,6 +240,3 @@ def test_calm_water_is_the_manoeuvring_model(name: str) -> None:
         for column, limit in (("u", 0.02), ("v", 0.02), ("r", np.radians(0.05))):
             error = (six[column] - three[column]) ** 2
             assert np.sqrt(error.groupby(six["run"]).mean()).max() < limit, column
-
-
-# ---- the step, and the mirror

@@ -39,7 +39,6 @@ def test_what_is_identified_is_integrated_as_it_predicts(tmp_path: Path, integra
     document["family"].append({"name": "fit", "extends": "right", "identify": {"parameters": ["inertia.m"]}})
     plan = build_plan(document, tmp_path / "tiny.toml")
     settings = next(one.identify for one in plan.foundations if one.name == "fit")
-    assert settings is not None
     assert (settings.method, settings.step, settings.horizon) == (integrator, 0.5, plan.study.prediction.ahead)
     assert settings.current == "none"  # the cell predicts without one
 
@@ -77,8 +76,6 @@ def test_an_observer_measures_no_position_where_velocities_make_the_path(tmp_pat
     document |= {"data": {"dataset": "log.parquet", "path": "velocity"}, "split": {"test": ["f"]}}
     recorded = build_plan(document, tmp_path / "tiny.toml")
     here, there = (next(one.observer for one in plan.foundations if one.observer) for plan in (simulated, recorded))
-    assert here is not None
-    assert there is not None
     assert {"north", "east"} <= set(here.measured)
     assert set(there.measured) == {"psi", "u", "v", "r"}
     assert here.current != 0.0
@@ -97,8 +94,6 @@ def test_an_identified_family_on_an_identified_one_has_the_members_of_the_first(
     right, fitted, again, _ = plan.foundations
     assert right.variant == fitted.variant == again.variant
     assert fitted_families(plan) == {"fitted", "again"}
-    assert fitted.identify is not None
-    assert again.identify is not None
     assert (fitted.identify.horizon, again.identify.horizon) == (5.0, 9.0)
 
 
@@ -122,8 +117,6 @@ def test_similar_ships_are_the_members_of_a_family(tmp_path: Path) -> None:
     other = {one.name: one for one in build_plan(document, tmp_path / "tiny.toml").foundations}
     for place, one in enumerate(sizes, start=1):
         again = other[f"alone-{place}"].vessel
-        assert again is not None
-        assert one is not None
         assert again.digest == one.digest
     (folder / "long.toml").unlink()
     assert build_plan(plan.document, tmp_path / "tiny.toml", vessels=plan.vessels).digest == plan.digest

@@ -53,7 +53,6 @@ def test_a_wrong_model_finds_the_right_numbers(recorded: Recorded) -> None:
     assert accuracy_of(foundations["wrong"].test_paths, prepared.test)["A"] > 0.01
     assert accuracy_of(foundations["fitted"].test_paths, prepared.test)["A"] < 1e-4
     variant = foundations["fitted"].foundation.variant
-    assert variant is not None
     right = plan.vessels["gunnerus-28.9"].parameters
     assert [variant.values[path] for path in PATHS] == pytest.approx([right[path] for path in PATHS], rel=1e-3)
     assert "converged" in foundations["fitted"].sentence

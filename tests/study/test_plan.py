@@ -39,8 +39,6 @@ from shipid.study.schema import Data
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
 
-ROOT = Path(__file__).parents[2]
-
 
 @pytest.mark.parametrize(
     ("name", "foundations", "alone", "batches"),
@@ -78,7 +76,6 @@ def test_orders_and_weather_make_pairs_of_runs_and_nothing_else_does(tmp_path: P
     """Runs of two truths are pairs where all is alike that is drawn before the ship reacts."""
     plan = tiny_plan(tmp_path)
     draws, truth = drawn_conditions(plan), plan.study.truth
-    assert truth is not None
     noisy = tiny_plan(tmp_path, {"truth.manoeuvres": 13, "truth.sensors.u.noise": 0.1, "grid.N_D": [5]})
     assert draws == drawn_conditions(noisy)
     sea = {"H_s": 1.0, "T_p": 6.0}
@@ -97,7 +94,6 @@ def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
     """The architecture document pins it: higher-order damping removed, N_ur, Y_ur, N_uv times 0.6, nothing else."""
     models = {model.name: model for model in read_plan("full-scale").foundations}
     variant, base = models["inaccurate"].variant, load_vessel("gunnerus-28.9").parameters
-    assert variant is not None
     wanted = dict(base)
     for path in base:
         _, _, factors = path.removeprefix("hull.derivatives.").partition("_")
@@ -109,7 +105,6 @@ def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
     assert values == pytest.approx(wanted, rel=1e-15)
     assert sum(value == 0.0 for path, value in values.items() if base[path] != 0.0) > 5
     accurate = models["accurate"].variant
-    assert accurate is not None
     assert accurate.parameters == list(base.values())
 
 
@@ -133,15 +128,12 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
         model.variant is None or model.variant.values == wide[model.variant.name].values for model in small.foundations
     )
     nominal = wide["nominal"]
-    assert nominal is not None
     assert not nominal.values
 
 
 def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path: Path) -> None:
     changes = {"grid.seeds": [0, 2]}
     here, there = tiny_plan(tmp_path, changes), tiny_plan(tmp_path, {**changes, "seed": 3})
-    assert here.study.truth is not None
-    assert there.study.truth is not None
     assert there.study.truth.seed == here.study.truth.seed + 3000
     assert there.study.split.seed == here.study.split.seed + 3000
     assert sorted({batch.seed for batch in there.batches}) == there.study.grid.seeds == [3000, 3002]

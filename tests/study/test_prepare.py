@@ -147,7 +147,6 @@ def test_members_that_diverge_in_training_are_redrawn_where_the_family_asks_for_
     rule = resolve_families(plan.study.family)[0]
     redrawn = 0
     for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
-        assert model.variant is not None
         counter = model.variant.counter
         assert model.variant == draw_variant(rule, model.member, SHIP, counter)
         assert sum(model.name in note for note in prepared.notes) == counter
@@ -252,7 +251,6 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     plan, dataset = recorded(logged(runs, t), split={"test": ["fast", "slow0"]}, family=[family])
     prepared = prepare(plan, dataset)
     for model in prepared.foundations[:-1]:
-        assert model.variant is not None
         assert model.variant.counter == 0
         one = prepared.known[model.name]
         assert [part.mean() for part in (one.diverged, one.test_diverged)] == [0.0, 0.5]
@@ -276,13 +274,11 @@ def test_hidden_states_follow_the_earlier_orders() -> None:
     ship, dataset = stepped(order=2.0, T=4.0, rate=100.0)
     windows = cut_windows(dataset, horizon=5)
     memory = window_memory(ship, dataset, windows)
-    assert memory is not None
     late = np.maximum(windows.t - 10.0, 0.0)
     for side in ("port", "starboard"):
         np.testing.assert_allclose(memory[f"{side}.n"], 2.0 - np.exp(-late / 4.0), rtol=1e-12)
     slow, _ = stepped(order=2.0, T=4.0, rate=0.01)
     limited = window_memory(slow, dataset, windows)
-    assert limited is not None
     np.testing.assert_allclose(limited["port.n"], 1.0 + 0.01 * late, rtol=1e-12)
     assert window_memory(SHIP, dataset, windows) is None
 
@@ -300,7 +296,6 @@ def test_perturbed_lags_have_separate_hidden_states(
     assert not np.allclose(prepared.known["lagged-1"].test_paths, prepared.known["lagged-2"].test_paths)
     for model in prepared.foundations[:-1]:
         vessel = model.vessel
-        assert vessel is not None
         predictor = Predictor(Physics(vessel, 5, 1.0), "alone", UnchangedPath({}))
         paths = predictor.predict(instants_of(plan.study, vessel, dataset, prepared.test))
         np.testing.assert_allclose(paths, prepared.known[model.name].test_paths, atol=1e-9)
@@ -379,7 +374,6 @@ def test_files_are_looked_for_beside_the_study(
     plan, dataset = recorded(logged({name: {"u": 2.0} for name in "abcd"}, np.arange(21.0)), split={"test": 1})
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    assert plan.study.data is not None
     plan.study.data.dataset = "log.parquet"
     assert obtain_runs(plan).runs == dataset.runs
 

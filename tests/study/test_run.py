@@ -195,8 +195,6 @@ def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     for row, predictor, _ in parts:
         expected, other = whole[row["cell"]]
         assert _plain(row) == _plain(expected)
-        assert predictor is not None
-        assert other is not None
         predictor.save(tmp_path / "one.npz")
         other.save(tmp_path / "other.npz")
         assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()

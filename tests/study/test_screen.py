@@ -111,15 +111,15 @@ def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("members", [2, 100])
 def test_chance_drives_nothing(members: int) -> None:
-    """200 families of 8 factors that A knows nothing of: two members had correlations of 1, and were believed."""
+    """100 families of 8 factors that A knows nothing of: two members had correlations of 1, and were believed."""
     rng = np.random.default_rng(members)
-    columns = {f"p{number}": rng.uniform(0.5, 1.5, 200 * members) for number in range(8)}
-    A = rng.lognormal(size=200 * members)
-    family = np.repeat([f"f{number}" for number in range(200)], members)
+    columns = {f"p{number}": rng.uniform(0.5, 1.5, 100 * members) for number in range(8)}
+    A = rng.lognormal(size=100 * members)
+    family = np.repeat([f"f{number}" for number in range(100)], members)
     frame = pd.DataFrame({"family": family, "member": family, "A": A, "A_90": A, "diverged": 0.0} | columns)
-    assert drivers_of_accuracy(frame)["family"].nunique() <= stats.binom.ppf(0.999, 200, 0.05)
+    assert drivers_of_accuracy(frame)["family"].nunique() <= stats.binom.ppf(0.999, 100, 0.05)
     driven = drivers_of_accuracy(frame.assign(A=A * frame["p3"] ** 12)).groupby("family", sort=False)["paths"].first()
-    assert members < 100 or (len(driven), set(driven)) == (200, {"p3"})
+    assert members < 100 or (len(driven), set(driven)) == (100, {"p3"})
 
 
 @pytest.mark.parametrize(
@@ -130,9 +130,8 @@ def test_chance_drives_nothing(members: int) -> None:
     ],
 )
 def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
-    with pytest.raises(DocumentError, match=remedy) as caught:
+    with pytest.raises(DocumentError, match=remedy):
         drawn_families(plan, name)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

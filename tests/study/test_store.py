@@ -85,7 +85,6 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
     with pytest.raises(ResultError, match=r"prediction.horizon: shipid .* does not take it .*new folder") as caught:
         store.stored_plan(study)
     assert caught.value.file == str(study / store.STUDY)
-    assert "\n" not in str(caught.value)
     vessels = (ship / store.VESSELS).read_text()
     (ship / store.VESSELS).write_text(vessels.replace('"inertia"', '"inertias"'))
     with pytest.raises(ResultError, match="does not take it") as caught:

@@ -243,8 +243,6 @@ def test_no_prediction_sees_a_later_row(whole: Finished, along: dict[str, pd.Dat
 def inputs_at(dataset: Dataset, physics: Physics, known: bool) -> tuple[Windows, dict[str, Array]]:
     """Every input there is at windows of a dataset."""
     windows = cut_windows(dataset, horizon=5, past=6)
-    assert physics.vessel is not None
-    assert physics.observer is not None
     estimates = at_instants(dataset, windows, run_observer(physics.vessel, dataset, physics.observer))
     inputs = Inputs(tuple(dataset.commands), Memory(**EVERYTHING))
     return windows, inputs.table(physics, windows.instants(known=known, estimates=estimates))

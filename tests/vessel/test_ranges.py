@@ -40,7 +40,6 @@ def test_the_remedy_of_the_message_helps(path: str) -> None:
     with pytest.raises(DocumentError) as caught:
         ship.with_values({path: 1.2e7})
     word = re.search(r'write unusual = \["(.*?)"\]', str(caught.value))
-    assert word is not None
     assert ship.with_values({path: 1.2e7, "unusual": [word[1]]}).document["unusual"] == [word[1]]
 
 

@@ -195,8 +195,6 @@ def registered(key: str, text: str, folder: Path, monkeypatch: pytest.MonkeyPatc
     file = folder / "mine.py"
     file.write_text(HEAD + text)
     spec = importlib.util.spec_from_file_location("mine", file)
-    assert spec is not None
-    assert spec.loader is not None
     module: Any = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "mine", module)
     spec.loader.exec_module(module)

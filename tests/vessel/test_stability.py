@@ -56,7 +56,6 @@ def test_a_ship_whose_sides_differ_has_two(side: int) -> None:
     vessel = load_vessel("kvlcc2-l7")
     controls = Controls(vessel)
     n = service_shaft(vessel, 1.1787)
-    assert n is not None
     rates = yaw_growths(vessel, 1.1787, controls.ahead(n))
     assert rates[0] < 0 < rates[1] == yaw_growth(vessel, 1.1787, controls.ahead(n))
     start = dict.fromkeys(vessel_dynamics(vessel).state, np.zeros(1)) | {"u": np.full(1, 1.1787)}

@@ -15,7 +15,7 @@ DRAWN = {
     **{"delta": (-0.6, 0.6), "rpm": (40.0, 160.0)},
 }
 
-LENGTH, RHO, GRAVITY = 175.0, 1025.0, 9.81
+LENGTH, GRAVITY = 175.0, 9.81
 POWERS = np.array(  # of v, r, p, phi, a row each, in the columns of the derivatives below
     [
         [1, 0, 0, 0, 3, 0, 2, 1, 2, 1, 0, 0],
