@@ -177,7 +177,8 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     words = [name for name in words if name not in columns]
     runs, since = clock_restarts(table, columns)
     try:
-        clock, t, once = clock_without_repeats(table, columns if since is None else columns | since, file)
+        started = table if since is None else table.assign(**since)
+        clock, t, once = clock_without_repeats(started, columns | (since or {}), model, file)
     except DataError:
         lost = next(filter(is_clock, other), None)
         if lost is not None and not any(map(is_clock, columns)):
