@@ -102,7 +102,7 @@ def _date_fields(columns: dict[str, Array]) -> dict[str, str]:
     return found
 
 
-def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
+def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array]]:
     """The column that says the run with the number of runs, and the clock, where it begins again with each."""
     for name in filter(is_clock, columns):
         steps = np.diff(columns[name])
@@ -114,7 +114,7 @@ def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict
             if np.all(changed[steps < 0]) and np.mean(changed) < 0.1:
                 length = float(np.ptp(columns[name])) + LONG * float(np.median(steps))
                 return {run: 1 + int(changed.sum())}, {name: columns[name] + np.append(0, np.cumsum(changed)) * length}
-    return {}, None
+    return {}, {}
 
 
 def clock_without_repeats(

@@ -149,7 +149,7 @@ def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> Non
     sniffed = recognise_log(file)
     assert sniffed.form["ragged"] == "drop"
     assert sniffed.notes == (
-        "2 lines repeat the header or have another number of cells, the first is line 21: left out",
+        "lines that repeat the header or have another number of cells are left out: 2, the first is line 21",
     )
     np.testing.assert_array_equal(sniffed.t, np.arange(60.0))
     with pytest.raises(DataError, match="repeats the header: remove the line") as caught:
