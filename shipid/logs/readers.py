@@ -158,7 +158,10 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
     rows = _filled_rows(io.StringIO(source, newline="") if isinstance(source, str) else source, form, file)
     head = list(itertools.islice(rows, LOOKED_AT))
     if not head:
-        raise _no_rows_error(form, file)
+        if form.skip_rows:
+            message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
+            raise DataError(message, file=file, path="format.skip_rows")
+        raise DataError("holds no line with values", file=file)
     names = _column_names([row for _, row in head], form, file)
     width = max((place + 1 for place, name in enumerate(names) if name), default=1)
     said = names if form.header and form.names is None else None
@@ -209,13 +212,6 @@ def _filled_rows(text: io.TextIOBase, form: TextFormat, file: Path) -> Iterator[
     except csv.Error as error:
         message = f"a cell without an end ({error}): is its closing quote lacking?"
         raise DataError(message, file=file, path=f"line {before + 1}") from None
-
-
-def _no_rows_error(form: TextFormat, file: Path) -> DataError:
-    if not form.skip_rows:
-        return DataError("holds no line with values", file=file)
-    message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
-    return DataError(message, file=file, path="format.skip_rows")
 
 
 def _column_names(head: list[list[str]], form: TextFormat, file: Path) -> list[str]:

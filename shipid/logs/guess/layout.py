@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import itertools
 import re
@@ -103,19 +104,20 @@ def _guess_encoding(head: bytes, file: Path) -> str:
     if b"\0" in head:
         refuse_power_cut(head, file)
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
-    begin = head[:-4] if len(head) > 4 else head  # the last character may be cut
     utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"
-    with suppress(UnicodeDecodeError):
-        begin.decode(utf8)
+    if _is_encoded(head, utf8):
         return utf8
-    words = {one: known_words(begin.decode(one, "ignore")) for one in ELSEWHERE}
+    words = {one: known_words(head.decode(one, "ignore")) for one in ELSEWHERE}
     best = max(ELSEWHERE, key=lambda one: words[one])
-    if words[best] > 1:
-        return best
+    return best if words[best] > 1 else "cp1252" if _is_encoded(head, "cp1252") else "latin-1"
+
+
+def _is_encoded(head: bytes, encoding: str) -> bool:
+    """Whether the first bytes of a text are of an encoding; the last character may be cut."""
     with suppress(UnicodeDecodeError):
-        begin.decode("cp1252")
-        return "cp1252"
-    return "latin-1"
+        codecs.getincrementaldecoder(encoding)().decode(head)
+        return True
+    return False
 
 
 def _text_format(

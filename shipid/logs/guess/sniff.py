@@ -243,10 +243,11 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
     if _says_ship(name) and (_are_measured(ships) or len(texts) < ROWS_EACH * len(ships)):
         return
     if len(ships) > 1:
-        first = ", ".join(ships[:3])
-        message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
-        remedy = "write the rows of each ship to a separate log, or take the column out of the log if it is one ship"
-        raise DataError(f"{message}: {remedy}", file=file)
+        raise DataError(
+            f"holds {len(ships)} ships ({name!r} is {', '.join(ships[:3])}{', ...' * (len(ships) > 3)}): write the "
+            "rows of each ship to a separate log, or take the column out of the log if it is one ship",
+            file=file,
+        )
 
 
 def _says_ship(name: str) -> bool:

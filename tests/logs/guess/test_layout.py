@@ -103,6 +103,15 @@ def test_encodings_of_other_scripts(names: tuple[str, ...], encoding: str, tmp_p
     )
 
 
+@pytest.mark.parametrize("last", ["°C", "°", "C°C "])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_an_encoding_does_not_depend_on_the_last_letters(last: str, end: str, tmp_path: Path) -> None:
+    """Four bytes were cut off, perhaps in a letter of two: a log in utf-8 that ends so was taken for cp1252."""
+    lines = text(table=TABLE.assign(unit=last)).splitlines()
+    (tmp_path / "log.csv").write_bytes((end.join(lines) + end).encode())
+    assert recognise_log(tmp_path / "log.csv").form["encoding"] == "utf-8"
+
+
 def test_a_separator_between_quotes_is_part_of_a_name(tmp_path: Path) -> None:
     """Such a header was taken for no header, and columns were called by their numbers."""
     names = ["time", "Rudder angle [deg, + port]", "x, y", "n"]
