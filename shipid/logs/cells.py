@@ -17,8 +17,7 @@ from shipid.logs.mapping import (
     OF_SHIP,
     degrees_and_minutes,
     degrees_in_parts,
-    degrees_in_text,
-    degrees_to_sides,
+    degrees_to_side,
     quaternion_size,
     quaternion_yaw,
     rate_of_ais,
@@ -157,7 +156,7 @@ def parse_numbers(
         numbers = text_numbers(text.mask(missing), read.decimal, read.thousands)
     if sides and np.any(~np.isfinite(numbers) & ~missing):
         words = in_points(text, read.decimal, None).mask(missing)
-        angles = degrees_to_sides(words) if sides == OF_SHIP else degrees_in_text(words, sides)
+        angles = degrees_to_side(words, sides)
         if sides != OF_SHIP or np.isfinite(angles).sum() > np.isfinite(numbers).sum():
             numbers = angles
     sided = f" and no {'angle' if sides == OF_SHIP else 'position'} with {' or '.join(sides)}" if sides else ""

@@ -30,10 +30,10 @@ from shipid.logs.guess.clock import (
 from shipid.logs.guess.layout import format_of_sheet, guess_format
 from shipid.logs.guess.words import NO_VALUE, is_run, meaning_scores, name_parts, units_in_name
 from shipid.logs.mapping import (
+    OF_SHIP,
     SIDES,
     degrees_in_parts,
-    degrees_in_text,
-    degrees_to_sides,
+    degrees_to_side,
     quaternion_size,
     quaternion_yaw,
     source_columns,
@@ -159,7 +159,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     columns, words = _number_columns(table, decimal, form.get("thousands"))
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
     in_text, letters = _in_text(table, [*words, *rarely], decimal)
-    columns |= dict(in_text.values()) | _to_sides(table, [*words, *rarely], decimal)
+    columns |= dict(in_text.values())
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_missing_value_texts(table, columns)]
@@ -367,36 +367,26 @@ def _quaternion_columns(columns: dict[str, Array]) -> Made:
 def _in_text(
     table: pd.DataFrame, names: list[str], decimal: str
 ) -> tuple[dict[str, tuple[str, Array]], frozenset[str]]:
-    """Name -> column of text and degrees (N,) of each latitude and longitude in it, and the letters of their sides.
+    """Name -> column of text and degrees (N,) of each latitude, longitude and angle to a side of the ship in it.
 
-    A column that holds both is called `Position latitude` and `Position longitude`.
+    Also the letters of the sides of the Earth. A column that holds a latitude and a longitude is called
+    `Position latitude` and `Position longitude`.
     """
     found: dict[str, tuple[str, Array]] = {}
     letters: set[str] = set()
     for name in filter(None, names):
         texts = in_points(column_called(table, name).astype(str).str.strip(), decimal, None)
-        meant = [one for one in SIDES if meaning_scores(name).get(one, 0.0) > 0.5]
-        read = {one: degrees_in_text(texts, SIDES[one]) for one in meant or SIDES}
-        known = {one: values for one, values in read.items() if np.mean(np.isfinite(values)) > 0.5}
+        sure = [one for one, score in meaning_scores(name).items() if score > 0.5]
+        meant = [one for one in SIDES if one in sure] or [one for one in sure if one in ("delta", "alpha", "phi")]
+        read = {one: degrees_to_side(texts, SIDES.get(one, OF_SHIP)) for one in meant or SIDES}
         # a time of day may be both: then they are equal
-        lettered = meant or np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) > 0
-        if len(known) != len(read) or not lettered:
+        alike = not meant and np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) == 0
+        if alike or any(np.mean(np.isfinite(values)) <= 0.5 for values in read.values()):
             continue
-        found |= {name if meant else f"{name} {one}": (name, values) for one, values in known.items()}
-        for one in known:
-            letters |= {letter for letter in SIDES[one] if texts.str.contains(letter, case=False).any()}
+        found |= {name if meant else f"{name} {one}": (name, values) for one, values in read.items()}
+        held = [letter for one in read for letter in SIDES.get(one, "")]
+        letters |= {letter for letter in held if texts.str.contains(letter, case=False).any()}
     return found, frozenset(letters)
-
-
-def _to_sides(table: pd.DataFrame, names: list[str], decimal: str) -> dict[str, Array]:
-    """Name -> degrees (N,) of each column of angles to the sides of the ship, such as P12.5; those to starboard > 0."""
-    found = {}
-    for name in names:
-        if max(meaning_scores(name).get(one, 0.0) for one in ("delta", "alpha", "phi")) > 0.5:
-            angles = degrees_to_sides(in_points(column_called(table, name).astype(str).str.strip(), decimal, None))
-            if np.mean(np.isfinite(angles)) > 0.5:
-                found[name] = angles
-    return found
 
 
 def _side_columns(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
