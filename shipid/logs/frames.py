@@ -15,7 +15,7 @@ from shipid.logs.mapping import Column, Mapping
 from shipid.logs.repairs import Despike, Records, interpolate_missing, remove_spikes
 from shipid.physics.signals import is_all_round, is_command, is_wrapped_angle, signal_row
 
-BLOCK = 200_000  # rows that are projected at once
+BLOCK = 200_000  # rows that are projected, or unwrapped, at once
 JUMP, JUMPY = np.radians(1.0), 20.0  # rad of a meridian; s, for half of which positions may jump: repairs come later
 PARALLEL = np.radians(0.05)  # rad: meridians that differ by less are parallel
 NEAR = 3.0  # usual steps: rows further apart are no neighbours
@@ -90,17 +90,10 @@ def is_turn(jumps: Array) -> NDArray[np.bool_]:
 
 
 def unwrap_in_place(values: NDArray[np.float64]) -> None:
-    """Unwrap an angle (N,) [rad] in place, bit by bit as `numpy.unwrap` does, with a quarter of its memory."""
-    steps = np.diff(values)
-    places = np.flatnonzero(~(np.abs(steps) < np.pi))
-    jumps = steps[places]
-    del steps
-    if len(places):
-        nearest = np.mod(jumps + np.pi, 2 * np.pi) - np.pi
-        nearest[(nearest == -np.pi) & (jumps > 0)] = np.pi
-        corrections = np.zeros(len(values))
-        corrections[places + 1] = nearest - jumps
-        values += np.cumsum(corrections, out=corrections)
+    """Unwrap an angle (N,) [rad] in place, as `numpy.unwrap` does, with the memory of one block of rows."""
+    for first in range(0, len(values), BLOCK):
+        part = slice(max(first - 1, 0), first + BLOCK)
+        values[part] = np.unwrap(values[part])
 
 
 def project_positions(

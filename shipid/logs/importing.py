@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as PlainMapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -51,7 +50,6 @@ from shipid.logs.mapping import (
     Mapping,
     PlaneOrigin,
     RunParts,
-    Segment,
     read_mapping,
     side_letters,
     source_columns,
@@ -151,18 +149,12 @@ def import_log(
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
     if mapping.parts is not None:
         pieces = [piece for run, part in each for piece in _split_runs(part, run)]
-        names = distinct_names(name for name, _ in pieces)
-        frame = pd.concat(
-            [_name_run(rows, name) for name, (_, rows) in zip(names, pieces, strict=True)], ignore_index=True
-        )
-    elif mapping.source.runs is None:
-        unit, t = to_si(mapping.clock.unit, "t"), rows["t"]
-        whole = Segment(run=clean_name(source.stem), start=t.iloc[0] / unit, end=t.iloc[-1] / unit)
-        frame, outside = _cut_into_runs(rows, mapping.segment or (whole,), unit, source)
-        repairs += outside
     else:
-        frame, outside = _cut_files(mapping, each, logs)
+        pieces, outside = _cut_segments(mapping, each, logs)
         repairs += outside
+    names = distinct_names(name for name, _ in pieces)
+    frames = [_name_run(rows, name) for name, (_, rows) in zip(names, pieces, strict=True)]
+    frame = frames[0] if len(frames) == 1 else pd.concat(frames, ignore_index=True)
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     dataset = Dataset(frame, metadata)
@@ -380,18 +372,19 @@ def _check_limits(rows: pd.DataFrame, t: Array, numbered: pd.Index[int] | None, 
 
 def _add_records(parts: list[Records]) -> Records:
     """The records of all files; counts of one kind and column are added up."""
-    if len(parts) == 1:
-        return parts[0]
-    total: dict[tuple[str, str, int], dict[str, Any]] = {}
+    alike: dict[tuple[str, str, int], Records] = {}
     for records in parts:
-        seen: list[tuple[str, str]] = []
+        seen = Counter[tuple[str, str]]()
         for record in records:
             key = (record["kind"], record["column"])
-            entry = total.setdefault((*key, seen.count(key)), {**record, "count": 0})
-            entry["count"] += record["count"]
-            entry["note"] = record["note"] if record["note"] == entry["note"] else f"over {len(parts)} files"
-            seen.append(key)
-    return list(total.values())
+            alike.setdefault((*key, seen[key]), []).append(record)
+            seen[key] += 1
+    notes = [{one["note"] for one in same} for same in alike.values()]
+    return [
+        {**same[0], "count": sum(one["count"] for one in same), "note": f"over {len(parts)} files"}
+        | ({"note": same[0]["note"]} if len(said) == 1 else {})
+        for same, said in zip(alike.values(), notes, strict=True)
+    ]
 
 
 def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFrame, Records, int, Begins]:
@@ -504,51 +497,40 @@ def _estimate_velocities(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tu
     return pd.concat(parts, ignore_index=True), records
 
 
-def _cut_into_runs(
-    rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path
-) -> tuple[pd.DataFrame, Records]:
-    """Put the runs one after another, and count the rows in none; rows that belong to two runs are repeated."""
-    t = rows["t"].to_numpy()
-    slack, step = clock_slack(t), float(np.median(np.diff(t)))
-    runs, outside = [], np.ones(len(t), dtype=bool)
-    for index, segment in enumerate(segments):
-        start, end = segment.start * unit, segment.end * unit
-        inside = (t >= start - slack) & (t <= end + slack)
-        if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
-            message = f"run {segment.run!r}, {format_span(start, end)}, is not in the log, "
-            message += f"which has {format_span(t[0], t[-1])}"
-            raise DataError(message, file=file, path=f"segment.{index}")
-        part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
-        runs.append(_name_run(part, segment.run))
-        outside &= ~inside
-    record = {"kind": "left out", "column": "", "count": int(outside.sum()), "note": f"of {len(t)} rows: in no segment"}
-    frame = runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
-    return frame, [record] if outside.any() else []
-
-
-def _cut_files(
+def _cut_segments(
     mapping: Mapping, each: list[tuple[str, ImportedLog]], logs: PlainMapping[str, Path]
-) -> tuple[pd.DataFrame, Records]:
-    """The runs of several files: the segments of each, the whole file where it has none; rows in none are counted."""
-    unit, frames, left = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), 0
-    for index, one in enumerate(mapping.segment):
-        if one.file not in logs or one.run in logs.keys() - {cut.file for cut in mapping.segment}:
-            file, path = next(iter(logs.values())).parent, f"segment.{index}"
-            if one.file in logs:
-                raise DataError(f"a run {one.run!r} exists, a whole file: take another name", file=file, path=path)
-            raise DataError(
-                f"no file {one.file!r}: {suggest_name(str(one.file), logs)}", file=file, path=f"{path}.file"
-            )
+) -> tuple[list[tuple[str, pd.DataFrame]], Records]:
+    """Name and rows of the segments of each log, of a whole log where it has none; rows in none are counted.
+
+    Rows that belong to two segments are repeated.
+    """
+    unit, left, whole = to_si(mapping.clock.unit, "t"), 0, logs.keys() - {cut.file for cut in mapping.segment}
+    for index, one in enumerate(mapping.segment if mapping.source.runs is not None else ()):
+        file, path = next(iter(logs.values())).parent, f"segment.{index}"
+        if one.file not in logs:
+            remedy = suggest_name(str(one.file), logs)
+            raise DataError(f"no file {one.file!r}: {remedy}", file=file, path=f"{path}.file")
+        if one.run in whole:
+            raise DataError(f"a run {one.run!r} exists, a whole file: take another name", file=file, path=path)
+    pieces: list[tuple[str, pd.DataFrame]] = []
     for run, part in each:
-        inside = [one for one in mapping.segment if one.file == run]
-        frame, outside = (
-            _cut_into_runs(part.rows, inside, unit, logs[run]) if inside else (_name_run(part.rows, run), [])
-        )
-        frames.append(frame)
-        left += sum(one["count"] for one in outside)
-    rows = sum(len(part.rows) for _, part in each)
-    record = {"kind": "left out", "column": "", "count": left, "note": f"of {rows} rows: in no segment"}
-    return pd.concat(frames, ignore_index=True), [record] if left else []
+        rows, t = part.rows, part.rows["t"].to_numpy()
+        slack, step, outside = clock_slack(t), float(np.median(np.diff(t))), np.ones(len(t), dtype=bool)
+        inside = [(index, one) for index, one in enumerate(mapping.segment) if one.file in (None, run)]
+        for index, segment in inside:
+            start, end = segment.start * unit, segment.end * unit
+            kept = (t >= start - slack) & (t <= end + slack)
+            if start < t[0] - step - slack or end > t[-1] + step + slack or kept.sum() < 2:
+                message = f"run {segment.run!r}, {format_span(start, end)}, is not in the log, "
+                message += f"which has {format_span(t[0], t[-1])}"
+                raise DataError(message, file=logs[run], path=f"segment.{index}")
+            pieces.append((segment.run, rows if kept.all() else rows.loc[kept].reset_index(drop=True)))
+            outside &= ~kept
+        if not inside:
+            pieces.append((run, rows))
+        left += int(outside.sum()) * bool(inside)
+    note = f"of {sum(len(part.rows) for _, part in each)} rows: in no segment"
+    return pieces, [{"kind": "left out", "column": "", "count": left, "note": note}] if left else []
 
 
 def _split_runs(log: ImportedLog, name: str) -> Iterator[tuple[str, pd.DataFrame]]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -287,16 +288,23 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
     """Make a mapping of the content of a document; `file` is what errors name."""
     if "digest" in raw:
         raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
-    parts: dict[str, Any] = {
-        "repair": list(_parse_repairs(raw.get("repair", []), file)),
-        "digest": document.digest_document(raw),
-    }
-    parts |= _parse_formats(raw, file)
-    if isinstance(raw.get("columns"), dict):
-        parts["columns"] = {
-            key: document.parse_model(Column, entry, file, prefix=f"columns.{key}")
-            for key, entry in raw["columns"].items()
+    parts: dict[str, Any] = {"digest": document.digest_document(raw)}
+    format_of = partial(_parse_kind, kinds=READERS, model_of=lambda kind: READERS[kind].options, file=file)
+    if "format" in raw:
+        parts["format"] = format_of(raw["format"], path="format")
+    if isinstance(tables := raw.get("file"), dict):
+        parts["file"] = {
+            key: {**one, "format": format_of(one.get("format", {}), path=f"file.{key}.format")}
+            if isinstance(one, dict)
+            else one
+            for key, one in tables.items()
         }
+    if not isinstance(tables := raw.get("repair", []), list):
+        raise DocumentError("must be a list of tables: write [[repair]]", file=file, path="repair")
+    parts["repair"] = [
+        _parse_kind(one, REPAIRS, lambda kind: REPAIRS[kind][0], file, f"repair.{index}")
+        for index, one in enumerate(tables)
+    ]
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
     clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     for check in (_check_mapped_columns, _check_missing, _check_instants, _check_segments, _check_repairs):
@@ -449,42 +457,12 @@ def is_date(t: float, unit: str) -> bool:
     return is_dated(unit) and FIRST_DATED_TIME < t < LAST_DATE
 
 
-def _parse_formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
-    """[format] and [file.<name>] as models, so that an unknown key is named with the keys of that kind of format."""
-    parts: dict[str, Any] = {}
-    if isinstance(raw.get("format"), dict):
-        parts["format"] = _parse_format(raw["format"], file, "format")
-    if isinstance(raw.get("file"), dict):
-        parts["file"] = {}
-        for key, entry in raw["file"].items():
-            inner = {} if not isinstance(entry, dict) else entry
-            form = _parse_format(inner.get("format", {}), file, f"file.{key}.format")
-            read = {**inner, "format": form} if isinstance(entry, dict) else entry
-            parts["file"][key] = document.parse_model(File, read, file, prefix=f"file.{key}")
-    return parts
-
-
-def _parse_format(raw: Any, file: Path, path: str) -> Format:
-    kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
-    if kind not in READERS:
-        raise DocumentError(
-            f"unknown kind {kind!r}: {suggest_name(kind, READERS.names)}", file=file, path=f"{path}.kind"
-        )
-    form: Format = document.parse_model(READERS[kind].options, raw, file, prefix=path)
-    return form
-
-
-def _parse_repairs(raw: Any, file: Path) -> Iterator[Repair]:
-    """Every [[repair]] as the model of its kind, so that an unknown key is named with the keys of that kind."""
-    if not isinstance(raw, list) or not all(isinstance(entry, dict) for entry in raw):
-        raise DocumentError("must be a list of tables: write [[repair]]", file=file, path="repair")
-    for index, entry in enumerate(raw):
-        kind = str(entry.get("kind", ""))
-        if kind not in REPAIRS:
-            raise DocumentError(
-                f"unknown kind {kind!r}: {suggest_name(kind, REPAIRS)}", file=file, path=f"repair.{index}"
-            )
-        yield document.parse_model(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
+def _parse_kind(raw: Any, kinds: Collection[str], model_of: Callable[[str], Any], file: Path, path: str) -> Any:
+    """A table as the model of its kind, so that an unknown key is named with the keys of that kind."""
+    kind = str(raw.get("kind", "" if kinds is REPAIRS else "text")) if isinstance(raw, dict) else ""
+    if isinstance(raw, dict) and kind not in kinds:
+        raise DocumentError(f"unknown kind {kind!r}: {suggest_name(kind, kinds)}", file=file, path=f"{path}.kind")
+    return document.parse_model(model_of(kind), raw, file, prefix=path) if isinstance(raw, dict) else raw
 
 
 def _check_mapped_columns(mapping: Mapping, file: Path) -> Faults:

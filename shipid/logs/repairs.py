@@ -241,35 +241,31 @@ def take_earlier(rows: pd.DataFrame, repair: Latency) -> Outcome:
 
     Rows whose t + d lies outside the stretch are removed.
     """
-    t = rows["t"].to_numpy()
-    stretch = _stretch_number(rows)
-    psi = rows["psi"].to_numpy()
+    t, stretch, psi = rows["t"].to_numpy(), _stretch_number(rows), rows["psi"].to_numpy()
     names = {"position": ("north", "east"), "heading": ("psi",), "yaw rate": ("r",), "velocity": ("u", "v")}[
         repair.signal
     ]
     missing = [name for name in names if name not in rows]
     if missing:
         return Outcome(rows, np.zeros(len(rows), dtype=bool), 0, f"no {missing[0]} is logged: nothing to shift")
+    signals = {name: rows[name].to_numpy() for name in names}
     ground = (rows["u"] + 1j * rows["v"]).to_numpy() * np.exp(1j * psi) if {"u", "v"} <= set(rows.columns) else None
-    inside, healed = np.zeros(len(t), dtype=bool), {name: rows[name].to_numpy().copy() for name in names}
-    moved = None if ground is None else ground.copy()
+    if ground is not None and repair.signal == "velocity":
+        signals = {"u": ground.real, "v": ground.imag}
+    inside, healed = np.zeros(len(t), dtype=bool), {name: values.copy() for name, values in signals.items()}
     for part in np.unique(stretch):
         here = np.flatnonzero(stretch == part)
         at = t[here] + repair.seconds
         inside[here] = (at >= t[here[0]]) & (at <= t[here[-1]])
-        for name in names:
-            healed[name][here] = np.interp(at, t[here], rows[name].to_numpy()[here])
-        if moved is not None and ground is not None and repair.signal == "velocity":
-            moved[here] = np.interp(at, t[here], ground.real[here]) + 1j * np.interp(at, t[here], ground.imag[here])
-    if moved is not None and (repair.signal == "velocity" or (repair.signal == "heading" and repair.turn)):
-        body = moved * np.exp(-1j * (healed["psi"] if repair.signal == "heading" else psi))
+        for name, values in signals.items():
+            healed[name][here] = np.interp(at, t[here], values[here])
+    if ground is not None and (repair.signal == "velocity" or (repair.signal == "heading" and repair.turn)):
+        moved = healed["u"] + 1j * healed["v"] if repair.signal == "velocity" else ground
+        body = moved * np.exp(-1j * healed.get("psi", psi))
         healed |= {"u": body.real, "v": body.imag}
-    first = np.zeros(len(t), dtype=bool)
-    kept = np.flatnonzero(inside)
-    first[kept[np.append(True, np.diff(stretch[kept]) > 0)] if len(kept) else kept] = True
-    begins = first & (stretch > stretch[0])
-    flags = rows["flags"].to_numpy() | np.where(begins, 1 << FLAGS.index(BREAK), 0)
-    result = rows.assign(**healed, flags=flags).loc[inside].reset_index(drop=True)
+    result = rows.assign(**healed).loc[inside].reset_index(drop=True)
+    begins = np.diff(stretch[inside], prepend=stretch[:1]) > 0  # the first row that is left of a stretch is a break
+    result["flags"] |= np.where(begins, 1 << FLAGS.index(BREAK), 0)
     note = f"{repair.signal} taken {repair.seconds:g} s later, {int((~inside).sum())} rows at the ends removed"
     return Outcome(result, np.ones(len(result), dtype=bool), len(result), note)
 

@@ -38,7 +38,7 @@ MAPPINGS = {
     "two_frames": ("columns.v.frame", "both 'body' or both 'earth'"),
     "wind_without_direction": ("columns.beta_w.direction", "must be 'towards' or 'from'"),
     "wind_without_angle": ("columns", "needs both V_w and beta_w"),
-    "unknown_repair": ("repair.0", "did you mean 'despike'?"),
+    "unknown_repair": ("repair.0.kind", "did you mean 'despike'?"),
     "unknown_repair_key": ("repair.0.enable", "did you mean 'enabled'?"),
     "repair_without_reason": ("repair.0.reason", "missing"),
     "repair_of_no_column": ("repair.0.columns", "valid: east, north"),
