@@ -98,6 +98,10 @@ class Cause:
         """The key without the words that tell variants of a cause apart."""
         return self.key.partition(" / ")[0]
 
+    def is_like(self, other: Cause) -> bool:
+        """Whether both are of one class."""
+        return self.name in (other.name, *other.equals) or other.name in self.equals
+
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
         return tuple((np.exp(theta) if self.ratio else theta).tolist())
