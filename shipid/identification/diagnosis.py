@@ -662,19 +662,18 @@ def _gain_of(result: Diagnosis, name: str) -> float:
 
 def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     """The best of all causes as a diagnosis, and its fit where it explains more than chance would."""
-    base = log.plain_residuals
+    given = log.plain_residuals, log.path_errors(log.motion)
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
-    rest = min(log.misfit(z) for z in (base, *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
+    rest = min(log.misfit(z) for z in (given[0], *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
     fits |= {
         key: replace(fit, cause=replace(fit.cause, cost=np.inf))
         for key, fit in fits.items()
         if fit.cause.of_runs and not log.needs_runs(fit, rest)
     }
-    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
+    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(given[0]) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
-    given = base, log.path_errors(log.motion)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
     misfits |= {key: fits[key].cause.cost - log.gain(given, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
@@ -684,11 +683,10 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
     ease = {key: 1.0 if fits[key].cause.trial else DISCRETE for key in order}
     worth = {key: (min(before, whole) - x) / whole / ease[key] * fits[key].counts for key, x in left.items()}
-    share, decisive = 1 - left[order[0]] / before, DECISIVE * log.worth * ease[order[0]]
-    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
+    decisive = DECISIVE * log.worth * ease[order[0]]
+    result = Diagnosis(NONE, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    others = [-misfits[key] for key, fit in fits.items() if not fit.cause.is_like(fits[order[0]].cause)]
-    rival = max(others, default=np.inf)
+    rival = max((-misfits[key] for key in fits if not fits[key].cause.is_like(fits[order[0]].cause)), default=np.inf)
     by_chance = gain < min(-ndtri(LEVEL / len(causes)) * error, decisive, UNRIVALLED * max(rival, 1.0))
     plain = {key: log.plainness(fits[key]) for key in order}
     if missed < log.blur or (by_chance and plain[order[0]] <= PLAIN):
@@ -700,10 +698,10 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     if not told:
         return result, fits[order[0]] if gain > decisive else None
     cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
-    result = replace(result, share=1 - left[cause.key] / before)
+    result = replace(result, share=1 - left[cause.key] / before, equals=tuple(near))
     if not all(map(cause.is_like, told)):
         sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
-        return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=sentence + cause.remedy), best
+        return replace(result, cause=UNCLEAR, sentence=sentence + cause.remedy), best
     equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in first)]))
     return _describe(replace(result, cause=cause.name, equals=equals), best), best
 
