@@ -116,15 +116,14 @@ def _check_ranges(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
             yield _check_row(f"range {name}", largest, unit, row.plausible, sentence)
 
 
-def white_noise_of(values: Array) -> float:
-    """Standard deviation of the white noise of a smooth signal (N,), from its second differences.
+def white_noise_of(*stretches: Array) -> float:
+    """Standard deviation of the white noise of a smooth signal in stretches (N,), from its second differences.
 
     E (x[i-1] - 2 x[i] + x[i+1])^2 = 6 sigma^2 for a signal that is straight over three rows; what curves adds to it, so
-    that the noise is rather too large. The median makes jumps count little.
+    that the noise is rather too large. The median, 0.6745 sigma of normal values, makes jumps count little.
     """
-    if len(values) < 5:
-        return 0.0
-    return float(np.median(np.abs(np.diff(values, 2))) / (0.6745 * np.sqrt(6.0)))
+    second = np.concatenate([np.diff(one, 2) for one in stretches])
+    return float(np.median(np.abs(second))) / 0.6745 / 6**0.5 if len(second) > 2 else 0.0
 
 
 def way_not_travelled(rows: pd.DataFrame) -> Plane:

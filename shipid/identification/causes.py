@@ -98,6 +98,10 @@ class Cause:
         """The key without the words that tell variants of a cause apart."""
         return self.key.partition(" / ")[0]
 
+    def is_like(self, other: Cause) -> bool:
+        """Whether both are of one class."""
+        return self.name in (other.name, *other.equals) or other.name in self.equals
+
     def sizes(self, theta: Array) -> tuple[float, ...]:
         """Size in SI units of the numbers (k,) of the fit."""
         return tuple((np.exp(theta) if self.ratio else theta).tolist())
@@ -129,13 +133,9 @@ def _subtract(name: str, motion: Motion, size: Array) -> Motion:
     return motion.put({name: motion.columns[name] - size[0]})
 
 
-def _divide(names: Sequence[str], motion: Motion, size: Array) -> Motion:
-    return motion.put({name: motion.columns[name] * np.exp(-size[0]) for name in names})
-
-
-def _divide_astern(name: str, motion: Motion, size: Array) -> Motion:
-    values = motion.columns[name]
-    return motion.put({name: np.where(values < 0, values * np.exp(-size[0]), values)})
+def _divide(names: Sequence[str], motion: Motion, size: Array, *, below: float = np.inf) -> Motion:
+    columns = {name: motion.columns[name] for name in names}
+    return motion.put({name: np.where(x < below, x * np.exp(-size[0]), x) for name, x in columns.items()})
 
 
 def multiply_signs(names: Sequence[str], signs: Array | float, motion: Motion, _: Array | None = None) -> Motion:
@@ -246,7 +246,7 @@ def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]
     )  # fmt: skip
     if is_shaft(name) and (values < 0).any() and (values > 0).any():
         yield Cause(
-            f"{key} scale astern", partial(_divide_astern, name), (0.05,), "1", 0.05, ratio=True,
+            f"{key} scale astern", partial(_divide, [name], below=0.0), (0.05,), "1", 0.05, ratio=True,
             repair=f"{column}# times {{over0}} where it is below 0",
             equals=("coefficient thrust astern",), tells=BESIDE,
         )  # fmt: skip

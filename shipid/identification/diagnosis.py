@@ -34,15 +34,18 @@ estimated without a part of the runs (or of the time, where there is one run) an
 The causes of least misfit also predict paths of 5 ship lengths, whose errors count as a seventh equation. How far noise
 makes them err is seen on the log with its noise once more.
 
-- `none`: no cause lowers the misfit by `DECISIVE` for each bump, or by more standard errors over blocks of time than
-  the best of so many causes has by chance (normal, with probability `LEVEL`: Bonferroni); or those that do so lower the
-  error of the paths by less than a share `WORTH` of that of the log as given; or that error is noise; or they are
-  smaller than what a log has anyhow (a command that is a row late).
+- `none`: no cause lowers the misfit by `DECISIVE` for each bump, or `UNRIVALLED` times as much as any of another class
+  (what physics lacks is made up for by several), or by more standard errors over blocks of time than the best of so
+  many causes has by chance (normal, with probability `LEVEL`: Bonferroni); or those that do so lower the error of the
+  paths by less than a share `WORTH` of that of the log as given; or that error is noise; or they are smaller than what
+  a log has anyhow (a command that is a row late). Of a cause without a size, which cannot be there in part, the share
+  `DISCRETE` of `DECISIVE` and `WORTH` is enough.
 - A cause that lowers the misfit of the equations of heading and position by `PLAIN` for each bump needs neither:
   kinematics hold for every ship, and paths may drown in noise.
 - Causes tie with that of least misfit where they are worse by less than `APART` standard errors, or the share `ALIKE`
-  of its gain. The first that explains a share `WORTH` is named. If others do so, its equals apart, the answer is
-  `cannot tell`, and `equals` are these causes; if its class does, these are `equals`.
+  of its gain. The first that explains a share `WORTH` is named; of those that need neither, one of a whole instrument,
+  then the best by kinematics. If others do so, its equals apart, the answer is `cannot tell`, and `equals` are these
+  causes; if its class does, these are `equals`.
 - Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
 - `current by run` must lower the misfit more than an unknown force of each run, such as a wind that the log lacks, and
   by more than the share `ALIKE` than any other cause.
@@ -104,8 +107,9 @@ FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of er
 SIGN, SIGN_STEPS, SIGN_ROUNDS = 1.0, 4, 4
 LEVEL, APART = 0.05, 2.0  # probability that any cause is so good by chance; standard errors
 BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
+UNRIVALLED = 7.0  # times the gain of any cause of another class: so much no defect of the physics gives
 DECISIVE, ALIKE = 2.0, 0.3  # gain for each bump that needs no standard error; share of a gain that a runner-up may lack
-WORTH, WORTH_DISCRETE = 0.2, 0.05  # share of the error of the paths; of a cause without a size, as a wrong sign
+WORTH, DISCRETE = 0.2, 0.25  # share of the error of the paths; of both thresholds, for a cause without a size
 STATES = ("u", "v", "r", "psi", "north", "east")
 
 
@@ -272,7 +276,7 @@ class _Log:
         share = (usual / self.step) ** 0.5
         series = {name: [np.asarray(rows[name], dtype=float) for _, rows in stretches] for name in STATES}
         series["psi"] = [np.unwrap(values) for values in series["psi"]]
-        u, v, r, psi, north, east = (share * np.median([*map(white_noise_of, series[name])]) for name in STATES)
+        u, v, r, psi, north, east = (share * white_noise_of(*series[name]) for name in STATES)
         sizes = (np.sqrt(np.mean(self.motion.columns[name] ** 2)) for name in ("u", "v", "r"))
         rough = max(noise / max(size, 1e-12) for noise, size in zip((u, v, r), sizes, strict=True))
         self.smooth = SMOOTH * float(np.clip(rough / NOISY, self.calm, 3.0))
@@ -390,10 +394,10 @@ class _Log:
         """Sum over the equations of n ln(mean square + floor^2), n being bumps that do not overlap."""
         return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
 
-    def is_plain(self, fit: _Fit) -> bool:
-        """Whether kinematics alone show a cause."""
+    def plainness(self, fit: _Fit) -> float:
+        """By how much a cause lowers the misfit of kinematics alone, for each bump."""
         before, after = ((z[3:] ** 2).mean(axis=1) + self.noise[3:] ** 2 for z in (self.plain_residuals, fit.left_out))
-        return fit.counts and bool(np.log(before / after).sum() / 2 > PLAIN)
+        return fit.counts * float(np.log(before / after).sum()) / 2
 
     def needs_runs(self, fit: _Fit, rest: float) -> bool:
         """Whether a cause by run gains more than an unknown force of each run, and than another with misfit `rest`.
@@ -629,18 +633,18 @@ def diagnose(
     names = list(dataset.runs if runs is None else runs)
     log = _Log(dataset, names) if vessel is None else _VesselLog(vessel, dataset, names, environment or {})
     causes = [cause for cause in log.causes() if keys is None or cause.key in keys]
-    motion, whole = log.motion, log.beyond_noise(log.plain_errors)
-    first, fit = _judge(log, causes, whole)
+    motion = log.motion
+    first, fit = _judge(log, causes)
     if fit is None:
         return first
     log.repair(fit.motion)
-    second, other = _judge(log, [one for one in causes if one.name != fit.cause.name], whole)
+    second, other = _judge(log, [one for one in causes if one.name != fit.cause.name])
     rivals = [name for name in first.equals if first.cause == UNCLEAR and name != fit.cause.name]
     if rivals and all(_gain_of(second, name) > BOTH * _gain_of(first, name) for name in rivals):  # both are there
         first = _describe(replace(first, cause=fit.cause.name, equals=()), fit)
     if other is not None and second.cause != NONE:  # what was best alone may not be so beside the other
         log.repair(other.cause.change(motion, other.theta))
-        first, fit = _judge(log, [one for one in causes if one.name != other.cause.name], whole)
+        first, fit = _judge(log, [one for one in causes if one.name != other.cause.name])
         log.repair(motion if fit is None else fit.cause.change(motion, fit.theta))
         second = second if second.cause == UNCLEAR else _describe(second, log.estimate(other.cause))
         if first.cause in (NONE, UNCLEAR):
@@ -653,49 +657,48 @@ def _gain_of(result: Diagnosis, name: str) -> float:
     return max(-misfit for key, misfit in (result.misfits or {}).items() if key.partition(" / ")[0] == name)
 
 
-def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis, _Fit | None]:
-    """The best of all causes as a diagnosis, and its fit where it explains more than chance would.
-
-    whole : error [m] of paths by the log as it was given, beyond its noise.
-    """
-    base = log.plain_residuals
+def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
+    """The best of all causes as a diagnosis, and its fit where it explains more than chance would."""
+    given = log.plain_residuals, log.path_errors(log.motion)
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key]) for key in near}
-    rest = min(log.misfit(z) for z in (base, *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
+    rest = min(log.misfit(z) for z in (given[0], *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
     fits |= {
         key: replace(fit, cause=replace(fit.cause, cost=np.inf))
         for key, fit in fits.items()
         if fit.cause.of_runs and not log.needs_runs(fit, rest)
     }
-    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(base) for key, fit in fits.items()}
+    misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(given[0]) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
-    plain = base, log.path_errors(log.motion)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
-    misfits |= {key: fits[key].cause.cost - log.gain(plain, one)[0] for key, one in seen.items()}
+    misfits |= {key: fits[key].cause.cost - log.gain(given, one)[0] for key, one in seen.items()}
     order = sorted(seen, key=misfits.__getitem__)
-    before, missed = log.beyond_noise(plain[1]), float(plain[1].mean())
-    gain, error = -misfits[order[0]], log.gain(plain, seen[order[0]])[1]
+    log.blind = min(log.blind, *(float(errors.mean()) for _, errors in (given, *seen.values())))
+    whole, before, missed = log.beyond_noise(log.plain_errors), log.beyond_noise(given[1]), float(given[1].mean())
+    gain, error = -misfits[order[0]], log.gain(given, seen[order[0]])[1]
     left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
-    worth = {key: (min(before, whole) - x) / whole * fits[key].counts for key, x in left.items()}
-    share, ahead, decisive = 1 - left[order[0]] / before, log.step * log.ahead, DECISIVE * log.worth
-    result = Diagnosis(NONE, share=share, error=missed, noise=log.blind, ahead=ahead, misfits=misfits)
+    ease = {key: 1.0 if fits[key].cause.trial else DISCRETE for key in order}
+    worth = {key: (min(before, whole) - x) / whole / ease[key] * fits[key].counts for key, x in left.items()}
+    decisive = DECISIVE * log.worth * ease[order[0]]
+    result = Diagnosis(NONE, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    by_chance = gain < min(-ndtri(LEVEL / len(causes)) * error, decisive)
-    if missed < log.blur or (by_chance and not log.is_plain(fits[order[0]])):
+    rival = max((-misfits[key] for key in fits if not fits[key].cause.is_like(fits[order[0]].cause)), default=np.inf)
+    by_chance = gain < min(-ndtri(LEVEL / len(causes)) * error, decisive, UNRIVALLED * max(rival, 1.0))
+    plain = {key: log.plainness(fits[key]) for key in order}
+    if missed < log.blur or (by_chance and plain[order[0]] <= PLAIN):
         return result, None
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
-    told = [one for one in tied if log.is_plain(fits[one.key])] or [
-        one for one in tied if worth[one.key] > (WORTH if one.trial else WORTH_DISCRETE)
-    ]
+    told = sorted((one for one in tied if plain[one.key] > PLAIN), key=lambda one: (one.cost, -plain[one.key]))
+    told = told or [one for one in tied if worth[one.key] > WORTH]
     if not told:
         return result, fits[order[0]] if gain > decisive else None
     cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
-    result = replace(result, share=1 - left[cause.key] / before)
-    if any(cause.name not in (one.name, *one.equals) and one.name not in cause.equals for one in told):
+    result = replace(result, share=1 - left[cause.key] / before, equals=tuple(near))
+    if not all(map(cause.is_like, told)):
         sentence = f"{result.how_far}: {' or '.join(near)} would explain that, and the log does not tell which"
-        return replace(result, cause=UNCLEAR, equals=tuple(near), sentence=sentence + cause.remedy), best
+        return replace(result, cause=UNCLEAR, sentence=sentence + cause.remedy), best
     equals = tuple(dict.fromkeys([*near[1:], *(key for key in cause.equals if key not in first)]))
     return _describe(replace(result, cause=cause.name, equals=equals), best), best
 

@@ -135,6 +135,7 @@ class Identification(IdentificationContent):
         base = vessel.key if is_bundled else os.path.relpath(vessel.file, file.parent)
         count = f"{len(self.runs)} {plural_word(len(self.runs), 'run')}"
         digest, changed = _as_read(vessel)
+        identified = vessel.with_values(solution.values)
         return patch_text(
             name=f"{vessel.name}, identified",
             base=base,
@@ -142,7 +143,7 @@ class Identification(IdentificationContent):
             source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
             values=changed | dict(solution.values),
             provenance=documents.plain_values(self._provenance()),
-            unusual=tuple(_unusual_numbers(vessel.with_values(solution.values))),
+            unusual=tuple(find_contradictions(identified.document, identified.parameters)),
         )
 
     def _provenance(self) -> dict[str, Any]:
@@ -384,15 +385,10 @@ def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[s
     judgements = {path: implausibility(vessel, path, values) for path in values}
     judgements |= {
         path: f"{path}: {words}; hold it, or give it a prior"
-        for path, words in _unusual_numbers(identified).items()
+        for path, words in find_contradictions(identified.document, identified.parameters).items()
         if not judgements.get(path)
     }
     return tuple(filter(None, judgements.values()))
-
-
-def _unusual_numbers(vessel: Vessel) -> dict[str, str]:
-    """Numbers that a document is refused for unless they are `unusual` in it: dotted path -> a sentence."""
-    return find_contradictions(vessel.document, vessel.parameters)
 
 
 def _compare_outputs(

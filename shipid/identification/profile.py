@@ -214,13 +214,10 @@ def interval_end_ratios(judged: Statistics, at: Beside, profiled: Sequence[str] 
     Of identified factors, but those with a narrow interval or `profiled`; at most `MOST`. 0 where a prediction
     diverges.
     """
-    fit, wide = judged.fit, _wide_factors(judged, profiled)
-    if not wide:
-        return {}
-    places, inverse = fit.free, judged.basis.inverse
+    fit, places, inverse = judged.fit, judged.fit.free, judged.basis.inverse
     least = float(np.square(at(np.zeros(len(fit.paths)))[0]).sum())
     result = {}
-    for j in wide:
+    for j in _wide_factors(judged, profiled):
         half, variance = float(judged.high[places[j]] - fit.factors[places[j]]), float(inverse[j, j])
         times = []
         for side in (-1, 1):

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import find_compiler, refuse_compiling
@@ -32,7 +33,6 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 MISSED = 0.02  # of speed, length and 1 rad: what a fitted model misses; 0.1 m/s and 0.2 deg/s at 5 m/s and 29 m
-NORMAL_MEDIAN = 0.6745  # of the absolute values of a standard normal variable
 # Steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling.
 COMPILE_FROM = 4e4
 CURRENT = ("V_c", "beta_c")  # channels that the nuisance of that name estimates
@@ -166,8 +166,8 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
 def typical_errors(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, float]:
     """State -> typical error [SI] of its prediction, from its own noise in the runs and the ship's speed U.
 
-    It is the root of noise^2 + (`MISSED` x)^2, x being U for u, v, w, U / L for p, q, r, L for a position and 1 for an
-    angle. The noise is white: second differences of the rows have 6 times its variance.
+    It is the root of white noise^2 + (`MISSED` x)^2, x being U for u, v, w, U / L for p, q, r, L for a position and 1
+    for an angle.
     """
     rows = dataset.select(runs)
     speed = float(np.sqrt((rows.frame[["u", "v"]] ** 2).sum(axis=1).mean())) or 1.0
@@ -175,14 +175,9 @@ def typical_errors(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dic
     scale = dict.fromkeys(("u", "v", "w"), speed) | dict.fromkeys(("p", "q", "r"), speed / length)
     scale |= dict.fromkeys(("north", "east", "down"), length) | dict.fromkeys(("psi", "phi", "theta"), 1.0)
     stretches = [stretch for _, stretch in stretches_of_runs(rows)]
-
-    def noise(name: str) -> float:
-        if name not in rows.frame:
-            return 0.0
-        second = np.concatenate([np.diff(stretch[name].to_numpy(), 2) for stretch in stretches])
-        return float(np.median(np.abs(second))) / NORMAL_MEDIAN / 6**0.5 if len(second) else 0.0
-
-    return {name: math.hypot(noise(name), MISSED * size) for name, size in scale.items()}
+    series = {name: [stretch[name].to_numpy() for stretch in stretches] for name in scale if name in rows.frame}
+    noise = dict.fromkeys(scale, 0.0) | {name: white_noise_of(*values) for name, values in series.items()}
+    return {name: math.hypot(noise[name], MISSED * size) for name, size in scale.items()}
 
 
 def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None:

@@ -31,6 +31,7 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import matmul_toeplitz
 from scipy.special import chdtrc, chdtri, stdtrit
 
 from shipid.document import short_names
@@ -463,7 +464,7 @@ def _of_signal(fit: LinearFit, basis: Basis, rows: NDArray[np.bool_], colour: Wh
     runs = [np.flatnonzero(fit.clusters[rows] == run) for run in np.unique(fit.clusters[rows])]
     smooth, power = jacobian.copy(), 0.0
     for run in runs if a else []:
-        smooth[run] = _apply_correlation(jacobian[run], a)
+        smooth[run] = matmul_toeplitz(a ** np.arange(len(run)), jacobian[run])
         power += float(len(run) + 2 * (a ** (2 * np.arange(1, len(run)))) @ np.arange(len(run) - 1, 0, -1))
     taken = basis.inverse @ (jacobian.T @ smooth)
     left = max(colour.freedom + float(np.sum(jacobian @ basis.inverse * jacobian) - np.trace(taken)), 1.0)
@@ -471,14 +472,6 @@ def _of_signal(fit: LinearFit, basis: Basis, rows: NDArray[np.bool_], colour: Wh
     freedom = max(left**2 / squares, 1.0) if a and squares > 0 else colour.freedom
     level = colour.level**2 * colour.freedom / left
     return level * (basis.inverse @ jacobian.T @ smooth @ basis.inverse), freedom
-
-
-def _apply_correlation(values: Array, a: float) -> Array:
-    """R values (N, n) of the correlation R_ij = a^|i - j|, (N, n)."""
-    size = len(values)
-    row = a ** np.minimum(np.arange(2 * size), 2 * size - np.arange(2 * size))
-    spectrum = np.fft.rfft(row)[:, None] * np.fft.rfft(values, 2 * size, axis=0)
-    return np.asarray(np.fft.irfft(spectrum, 2 * size, axis=0)[:size])
 
 
 def against_priors(judged: Statistics) -> dict[str, tuple[float, float, float]]:

@@ -30,7 +30,10 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -572,6 +575,18 @@ def print_scores(scores: list[tuple[FaultyLog, str, str]]) -> None:
         print(f"{count:4} x {true} -> {named}")
 
 
+def score_log(
+    options: argparse.Namespace, number: int, ship: FieldShip
+) -> tuple[FaultyLog, str, list[str], list[str], float]:
+    """Draw and diagnose one log: what it is, how it ended, the named causes, their equals, and CPU time [s]."""
+    faults = 0 if number >= options.count else (0, 1, 1, 1, 2)[number // options.ships % 5]
+    log = draw_faulty_log(options.seed, number, ship, faults)
+    begun = time.process_time()
+    with tempfile.TemporaryDirectory() as folder:
+        causes, equals = diagnose_log(log, Path(folder))
+    return log, judge_causes(log, causes, equals), causes, equals, time.process_time() - begun
+
+
 def main() -> None:
     """Draw, diagnose and score."""
     parser = argparse.ArgumentParser(description="Score the diagnosis of drawn faults.")
@@ -581,24 +596,20 @@ def main() -> None:
     )
     parser.add_argument("--sound", type=int, default=0, help="further sound logs")
     parser.add_argument("--ships", type=int, default=40)
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     options = parser.parse_args()
     ships = [draw_ship(number, options.seed) for number in range(options.ships)]
     scores, longest = [], 0.0
-    with tempfile.TemporaryDirectory() as folder:
-        for number in range(options.count + options.sound):
-            faults = 0 if number >= options.count else (0, 1, 1, 1, 2)[number // options.ships % 5]
-            log = draw_faulty_log(options.seed, number, ships[number % options.ships], faults)
-            begun = time.monotonic()
-            causes, equals = diagnose_log(log, Path(folder))
-            longest = max(longest, time.monotonic() - begun)
-            scores.append((log, judge_causes(log, causes, equals), " + ".join(causes)))
-            if scores[-1][1] in ("extra", "wrong", "alarm", "missed"):
+    with ProcessPoolExecutor(options.jobs) as pool:
+        each = pool.map(partial(score_log, options), range(options.count + options.sound), cycle(ships))
+        for number, (log, word, causes, equals, seconds) in enumerate(each):
+            longest = max(longest, seconds)
+            scores.append((log, word, " + ".join(causes)))
+            if word in ("extra", "wrong", "alarm", "missed"):
                 factors = ", ".join(f"{factor:.2g}" for factor in log.factors)
-                print(
-                    number, scores[-1][1], log.causes, f"x {factors}, noise {log.noise} ->", causes, equals, flush=True
-                )
+                print(number, word, log.causes, f"x {factors}, noise {log.noise} ->", causes, equals, flush=True)
     print_scores(scores)
-    print(f"longest diagnosis {longest:.0f} s")
+    print(f"longest diagnosis {longest:.0f} s of CPU time")
 
 
 if __name__ == "__main__":
