@@ -18,11 +18,10 @@ from tests.strangers_ships import candidates, dataset_columns, known_of, program
 class Stranger:
     """A ship that nobody has seen.
 
-    seed, words : how it was drawn. truth : the vessel that made the log. dataset : the log, with noise.
+    words : how it was drawn. truth : the vessel that made the log. dataset : the log, with noise.
     known : option of `shipid vessel new` -> what people know of the ship.
     """
 
-    seed: int
     words: str
     truth: Vessel
     dataset: Dataset
@@ -38,7 +37,7 @@ def stranger(seed: int, runs: int = 24) -> Stranger:
         except ShipidError:
             continue
         break
-    return Stranger(seed, drawn["words"], vessel, dataset, known_of(random, drawn, n))
+    return Stranger(drawn["words"], vessel, dataset, known_of(random, drawn, n))
 
 
 def strange_vessel(seed: int) -> tuple[Vessel, float, float]:
