@@ -10,6 +10,7 @@ import numpy as np
 
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
+from shipid.study.new import _round_number_below
 from shipid.vessel.load import Vessel
 from tests.strangers_ships import candidates, dataset_columns, known_of, programme_of, record_of
 
@@ -18,11 +19,10 @@ from tests.strangers_ships import candidates, dataset_columns, known_of, program
 class Stranger:
     """A ship that nobody has seen.
 
-    seed, words : how it was drawn. truth : the vessel that made the log. dataset : the log, with noise.
+    words : how it was drawn. truth : the vessel that made the log. dataset : the log, with noise.
     known : option of `shipid vessel new` -> what people know of the ship.
     """
 
-    seed: int
     words: str
     truth: Vessel
     dataset: Dataset
@@ -38,7 +38,7 @@ def stranger(seed: int, runs: int = 24) -> Stranger:
         except ShipidError:
             continue
         break
-    return Stranger(seed, drawn["words"], vessel, dataset, known_of(random, drawn, n))
+    return Stranger(drawn["words"], vessel, dataset, known_of(random, drawn, n))
 
 
 def strange_vessel(seed: int) -> tuple[Vessel, float, float]:
@@ -50,7 +50,12 @@ def strange_vessel(seed: int) -> tuple[Vessel, float, float]:
 def _log(random: np.random.Generator, vessel: Vessel, n: float, drawn: Mapping[str, Any], count: int) -> Dataset:
     """Runs of several kinds, in a current and gusts that nobody measured, with noise of the sensors."""
     U, L = drawn["U"], drawn["L"]
-    style = {"team": "basin" if drawn["model"] else "yard", "hz": 1 / _round(L / U / 12), "a day": 12, "tidy": False}
+    style = {
+        "team": "basin" if drawn["model"] else "yard",
+        "hz": 1 / _round_number_below(L / U / 12),
+        "a day": 12,
+        "tidy": False,
+    }
     record, _ = record_of(random, vessel, n, drawn, style, programme_of(random, count, style))
     frame = record[dataset_columns(record, wind=False)].copy()
     noise = {
@@ -60,8 +65,3 @@ def _log(random: np.random.Generator, vessel: Vessel, n: float, drawn: Mapping[s
     for name, size in noise.items():
         frame[name] = frame[name] + random.normal(0, size, len(frame))
     return Dataset(frame, {"clock": "run", "flags": []})
-
-
-def _round(value: float) -> float:
-    decade = 10.0 ** np.floor(np.log10(value))
-    return float(f"{max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)):.6g}")

@@ -26,7 +26,6 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
     "growth": 2,
     "commands": 2,
     "first": 2,
-    "cells": 1,
     "methods": 1,
     "orchestration": 1,
     "identification": 2,

@@ -56,7 +56,6 @@ class Cell:
     corrector: Corrector
     left_out: Array
     inside: Array
-    limits: tuple[str, ...]
     paths: Array
     spread: Array | None
     bands: Bands
@@ -84,7 +83,7 @@ def cell(made: World, runs: Sequence[str], method: Method, physics: Physics, see
         table = fitted.corrector.inputs.table(physics, made.fresh.instants())
         single = np.stack([network.predict(table) for network in fitted.corrector.networks])
         spread = single.std(axis=0, ddof=1)
-    return Cell(windows, fitted.corrector, fitted.left_out, inside, names, paths, spread, bands)
+    return Cell(windows, fitted.corrector, fitted.left_out, inside, paths, spread, bands)
 
 
 def by_run(run: Array, values: Array) -> float:

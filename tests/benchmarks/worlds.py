@@ -19,6 +19,7 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.log import state_column
 from shipid.simulation.standard import shaft_speed
 from shipid.simulation.truth import Truth, draw_manoeuvres, simulate_truth
+from shipid.study.new import _round_number_below
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document, load_vessel
 from tests.strangers import strange_vessel
@@ -65,7 +66,7 @@ def world(seed: int, fresh: int = 200, pool: int = 50, ship: str = "") -> World:
     one = _ship(ship, seed)
     names = sorted(map(str, draw.choice(KINDS, size=draw.integers(1, 4), replace=False)))
     horizon, interval = int(draw.integers(8, 21)), float(draw.integers(2, 6))
-    step = _nice(one.pace / LENGTHS)
+    step = _round_number_below(one.pace / LENGTHS)
     ranges = _ranges(one)
     environment = vessel_dynamics(one.truth).environment
     changes: dict[str, Any] = {}
@@ -148,9 +149,3 @@ def _wrong(vessel: Vessel, draw: np.random.Generator) -> Vessel:
     paths = [path for path in vessel.parameters if COEFFICIENT.match(path)]
     paths += ["added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot"] * bool(draw.integers(2))
     return vessel.with_values({p: vessel.parameters[p] * draw.uniform(1 - width, 1 + width) for p in sorted(paths)})
-
-
-def _nice(value: float) -> float:
-    """Greatest of 1, 2, 5 times a power of ten that is at most a value."""
-    decade = 10.0 ** np.floor(np.log10(value))
-    return float(f"{max(one * decade for one in (1, 2, 5) if one * decade <= value * (1 + 1e-9)):.6g}")

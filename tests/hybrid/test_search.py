@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import count
 from pathlib import Path
 from typing import Any, ClassVar
@@ -81,25 +83,34 @@ def task_in(here: World, kind: str, journal: Journal | None) -> Task:
     return replace(here.task(cases_of(here, kind), seed=2), journal=journal, cells={"a": "a+way-N0006-s2"})
 
 
-CUT = [(kind, 1 + len(kind) % 2, {}) for kind in SEARCHING]
+CUT = [(kind, 1 + len(kind) % 2, False) for kind in SEARCHING]
 RACE = {"at_once": 4, "epochs": 64}
 
 
+@pytest.fixture(scope="module")
+def undisturbed(here: World) -> Callable[[str, bool], dict[str, Any]]:
+    """What a search gives that nothing interrupts, by kind and whether it is a race; each is made once."""
+
+    def whole(kind: str, race: bool) -> dict[str, Any]:
+        return digits(longer(kind, **RACE if race else {}).fit(task_in(here, kind, None)), here, kind)
+
+    return cache(whole)
+
+
 @pytest.mark.parametrize(
-    ("kind", "after", "more"),
-    [*CUT, ("path-trained", 12, {}), *(("path-trained", after, RACE) for after in (6, 13, 14))],
+    ("kind", "after", "race"),
+    [*CUT, ("path-trained", 12, False), *(("path-trained", after, True) for after in (6, 13, 14))],
 )
 def test_a_search_that_was_interrupted_ends_with_the_same_digits(
-    kind: str, after: int, more: dict[str, Any], here: World, tmp_path
+    kind: str, after: int, race: bool, here: World, undisturbed: Callable[[str, bool], Any], tmp_path
 ) -> None:
-    method = longer(kind, **more)
-    whole = digits(method.fit(task_in(here, kind, None)), here, kind)
+    method = longer(kind, **RACE if race else {})
     file = tmp_path / "trials.log"
     journal = stopping(file, after)
     with suppress(Stopped):  # those that write once at the end have ended
         method.fit(task_in(here, kind, journal))
     resumed = method.fit(task_in(here, kind, open_journal(file)))
-    assert digits(resumed, here, kind) == whole
+    assert digits(resumed, here, kind) == undisturbed(kind, race)
     again = open_journal(file)  # and the journal holds it all, each trial once
     for name, cell in (("a", "a+way-N0006-s2"), ("none", "none")):
         if name in resumed:

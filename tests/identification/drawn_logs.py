@@ -34,7 +34,7 @@ FREE = re.compile(r"hull\.\w+\.(R_\w+|C_d|[XYN]_[uvr|]+)")
 
 @dataclass(frozen=True)
 class DrawnLog:
-    """A ship and its log: the true vessel, a wrong guess, settings of the fit, the speed [m/s] and what was drawn."""
+    """A ship and its log: the true vessel, a wrong guess, settings, speed [m/s] and time of a prediction [s]."""
 
     truth: Vessel
     guess: Vessel
@@ -42,8 +42,6 @@ class DrawnLog:
     settings: Identify
     speed: float
     ahead: float
-    currents: np.ndarray
-    words: str
 
     @property
     def held_out(self) -> list[str]:
@@ -108,7 +106,6 @@ def drawn_log(seed: int, speeds: tuple[float, float] = (0.1, 12.0)) -> DrawnLog:
     """The ship of a seed; speeds : least and greatest speed [m/s]."""
     rng = np.random.default_rng([seed, 57])
     base = load_vessel(str(rng.choice(BASES)))
-    assert base.length is not None
     while True:
         length, froude = float(np.exp(rng.uniform(0, np.log(300)))), float(rng.uniform(0.03, 0.25))
         speed = froude * float(np.sqrt(9.81 * length))
@@ -118,16 +115,15 @@ def drawn_log(seed: int, speeds: tuple[float, float] = (0.1, 12.0)) -> DrawnLog:
     coefficients = [path for path, x in truth.parameters.items() if FREE.fullmatch(path) and x]
     truth = truth.with_values({path: truth.parameters[path] * rng.uniform(0.9, 1.1) for path in coefficients})
     wrong = {path: truth.parameters[path] * float(np.exp(rng.normal(0, 0.35))) for path in coefficients}
-    guess, time = truth.with_values(wrong), length / speed
+    time = length / speed
     orders = _orders(truth, speed, rng)
     kind = str(rng.choice(["none", "one", "by run"]))
     size = rng.uniform(0.02, 0.1) * speed * (kind != "none")
     angle = rng.uniform(-np.pi, np.pi, RUNS + TESTS if kind == "by run" else 1) + np.zeros(RUNS + TESTS)
-    currents = size * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     sea = truth if "current" in truth.document else truth.with_values({"current.kind": "uniform"})
     model = vessel_dynamics(sea)
     environment = {name: np.zeros(RUNS + TESTS) for name in model.environment}
-    environment |= {"V_c": np.hypot(*currents.T), "beta_c": np.arctan2(currents[:, 1], currents[:, 0])}
+    environment |= {"V_c": np.full(RUNS + TESTS, size), "beta_c": angle}
     start = {name: np.zeros(RUNS + TESTS) for name in model.state}
     start |= {"psi": rng.uniform(-3, 3, RUNS + TESTS), "u": speed * rng.uniform(0.6, 1.0, RUNS + TESTS)}
     path = rollout(
@@ -153,6 +149,4 @@ def drawn_log(seed: int, speeds: tuple[float, float] = (0.1, 12.0)) -> DrawnLog:
     settings = Identify(parameters=free, prior=dict.fromkeys(free, 0.5) if priors else {}, step=step,
                         horizon=max(30.0, 4 * step))  # fmt: skip
     guess = truth.with_values({path: wrong[path] for path in free})
-    words = f"{base.key} {length:.3g} m, {speed:.2g} m/s, noise {noise:.1%}, current {kind} {size / speed:.1%}"
-    return DrawnLog(truth, guess, log, settings, speed, AHEAD * time, currents, f"{words}, {len(free)} free"
-                    f"{', priors' if priors else ''}")  # fmt: skip
+    return DrawnLog(truth, guess, log, settings, speed, AHEAD * time)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -44,6 +45,17 @@ def fitted(log: Dataset, **more: object) -> Solution:
     return solution
 
 
+@cache
+def steady_log() -> Dataset:
+    """Six runs in one current."""
+    return log_of(1, np.tile([0.3, 0.2], (6, 1)))
+
+
+@cache
+def steady_fit() -> Solution:
+    return fitted(steady_log())
+
+
 def estimated(solution: Solution) -> np.ndarray:
     """(R, 2) currents of the runs [m/s]."""
     return np.array([[run["current_north"], run["current_east"]] for run in solution.nuisances.values()])
@@ -63,7 +75,7 @@ def test_another_current_in_each_run_is_estimated_by_run(seed: int, more: dict) 
 
 @pytest.mark.parametrize("more", [{}, {"nuisance": {"current": 0.3}}])
 def test_one_current_of_all_runs_is_a_number_with_an_interval(more: dict) -> None:
-    solution = fitted(log_of(1, np.tile([0.3, 0.2], (6, 1))), **more)
+    solution = fitted(steady_log(), **more) if more else steady_fit()
     assert solution.settings.current == "one"
     assert solution.common_current == pytest.approx((0.3, 0.2), abs=0.02)
     assert solution.paths[-2:] == ("current_north", "current_east")
@@ -80,7 +92,7 @@ def test_one_current_of_all_runs_is_not_taken_for_others_by_run(seed: int, runs:
     assert solution.common_current == pytest.approx((0.5, 0.4), abs=0.02)
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_currents_that_scatter_about_a_strong_one_are_estimated_by_run(seed: int) -> None:
     currents = np.array([2.0, 0.4]) + drawn(seed)
     log = log_of(seed, currents)
@@ -124,36 +136,34 @@ HOW = {"parameters": FEW, "weights": NOISE, "horizon": 0, "start": "base"}
 
 
 def test_the_sentence_stays_where_residuals_are_discounted() -> None:
-    log = log_of(1, np.tile([0.3, 0.2], (6, 1)))
-    assert "one current of all runs" in " ".join(fitted(log, discount=True).warnings)
+    assert "one current of all runs" in " ".join(fitted(steady_log(), discount=True).warnings)
 
 
 def test_a_fit_begins_from_one_that_chose_a_current() -> None:
-    log = log_of(1, np.tile([0.3, 0.2], (6, 1)))
-    before = fitted(log)
+    log, before = steady_log(), steady_fit()
     after = identify(SHIP, log, log.runs, Identify(**HOW), start=before)
     np.testing.assert_allclose(after.factors, before.factors, atol=1e-5)
 
 
 @pytest.mark.parametrize("nuisance", [[], ["current"]])
-@pytest.mark.parametrize("share", [0.1, 0.9])
-def test_a_stop_by_the_user_is_kept(nuisance: list[str], share: float) -> None:
-    """The fit went on with a current, or gave the one without as if nobody had stopped."""
-    log, seen = log_of(1, np.tile([0.3, 0.2], (6, 1))), list[int]()
+def test_a_stop_by_the_user_is_kept(nuisance: list[str]) -> None:
+    """Soon or late: the fit went on with a current, or gave the one without as if nobody had stopped."""
+    log, seen = steady_log(), list[int]()
     settings = Identify(**HOW, nuisance=nuisance)
     identify(SHIP, log, log.runs, settings, progress=lambda number, _: seen.append(number))
-    most, count = int(share * len(seen)), list[int]()
+    for most in (len(seen) // 10, 9 * len(seen) // 10):
+        count = list[int]()
 
-    def stop(number: int, _: float) -> bool:
-        count.append(number)
-        return len(count) > most
+        def stop(number: int, _: float, most: int = most, count: list[int] = count) -> bool:
+            count.append(number)
+            return len(count) > most
 
-    assert identify(SHIP, log, log.runs, settings, progress=stop).status == "stopped"
-    assert len(count) == most + 1
+        assert identify(SHIP, log, log.runs, settings, progress=stop).status == "stopped"
+        assert len(count) == most + 1
 
 
 def test_a_fit_with_a_current_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    log = log_of(1, np.tile([0.3, 0.2], (6, 1)))
+    log = steady_log()
     real = solve._fit_dropping_factors
 
     def failing(*args: object) -> Solution:
