@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import partial
 from os import PathLike
@@ -53,6 +54,26 @@ class DataError(ShipidError):
 
 class ResultError(ShipidError):
     """A results folder or a saved predictor that is missing, foreign or damaged."""
+
+
+@contextmanager
+def placed_errors(
+    kind: type[ShipidError],
+    *,
+    file: str | PathLike[str] | None = None,
+    path: str | Callable[[str], str] | None = None,
+    into: type[ShipidError] | None = None,
+) -> Iterator[None]:
+    """Say where errors of a kind in the block are.
+
+    file : for those that name none. path : another, or what makes it of theirs; it is in `file`, whatever they name.
+    into : another kind.
+    """
+    try:
+        yield
+    except kind as error:
+        place = path(error.path or "") if callable(path) else path or error.path
+        raise (into or type(error))(error.message, file=file if path else error.file or file, path=place) from None
 
 
 def is_utf_8(text: str) -> bool:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -17,7 +16,7 @@ from casadi import MX
 from shipid.data.windows import Instants
 from shipid.engine.engines import AUTO
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.equations import Equations, rollout_records, split_by_name, step_function, symbols_of
+from shipid.export.equations import Equations, rollout_records, split_by_name, step_function
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.physics import Physics, positions_in_frame
 from shipid.vessel.dynamics import vessel_dynamics
@@ -181,48 +180,21 @@ def symbolic_physics(physics: Physics) -> SymbolicPhysics:
     return SymbolicPhysics(**{one.name: getattr(physics, one.name) for one in fields(Physics)})
 
 
-class PredictorInputs:
-    """Symbols of the inputs of a predictor.
-
-    physics : with the terms of a method. inputs : name -> symbol of `Layout.sizes`. now : entries by name.
-    """
-
-    def __init__(self, physics: Physics, names: InputLayout) -> None:
-        self.physics, self.names = symbolic_physics(physics), names
-        self.inputs = symbols_of(names.sizes)
-        self.now = split_by_name(names.now, self.inputs["now"])
-
-    @cached_property
-    def instants(self) -> Instants:
-        """The instant; places are relative to it."""
-        names, given = self.names, self.inputs
-        columns = rows_by_name(names.now, given["now"], 1)
-        estimates = rows_by_name(names.estimates, given["estimates"], 1)
-        for name in POSITION_ENTRIES:
-            place = columns.pop(name)
-            if f"observer.{name}" in estimates:
-                estimates[f"observer.{name}"] = estimates[f"observer.{name}"] - place
-        return Instants(
-            columns,
-            rows_by_name(names.past, ca.reshape(given["past"], len(names.past), names.num_past)),
-            rows_by_name(names.planned, ca.reshape(given["planned"], -1, names.horizon)) if names.planned else None,
-            rows_by_name(names.reached, given["reached"], 1) or None,
-            estimates,
-        )
-
-    def paths(self, physics: SymbolicPhysics) -> Any:
-        """Path (T, 1, 2) [m] of the physics alone; that of a simulator is an input."""
-        if not self.names.physics:
-            return physics.paths(self.instants)
-        given = ca.reshape(self.inputs["physics"], 2, self.names.horizon)
-        return ca.ArrayInterface.MX(given.T, shape=(self.names.horizon, 1, 2))
-
-    @property
-    def diverges(self) -> MX:
-        """Whether the rollout of the physics diverges; never without physics."""
-        if self.physics.vessel is None:
-            return MX(0)
-        return ca.logic_not(self.physics.is_slow(self.physics.records(self.instants)))
+def symbolic_instants(names: InputLayout, given: NamedExpressions) -> Instants:
+    """The instant of symbols of `InputLayout.sizes`; places are relative to it."""
+    columns = rows_by_name(names.now, given["now"], 1)
+    estimates = rows_by_name(names.estimates, given["estimates"], 1)
+    for name in POSITION_ENTRIES:
+        place = columns.pop(name)
+        if f"observer.{name}" in estimates:
+            estimates[f"observer.{name}"] = estimates[f"observer.{name}"] - place
+    return Instants(
+        columns,
+        rows_by_name(names.past, ca.reshape(given["past"], len(names.past), names.num_past)),
+        rows_by_name(names.planned, ca.reshape(given["planned"], -1, names.horizon)) if names.planned else None,
+        rows_by_name(names.reached, given["reached"], 1) or None,
+        estimates,
+    )
 
 
 def _row_lengths(places: MX) -> MX:

@@ -11,14 +11,15 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
+from shipid.data.windows import Instants
 from shipid.errors import ShipidError
-from shipid.export.equations import function_by_names, symbols_of
+from shipid.export.equations import function_by_names, split_by_name, symbols_of
 from shipid.export.known import (
     POSITION_ENTRIES,
     InputLayout,
     NamedExpressions,
-    PredictorInputs,
     change_arrays,
+    symbolic_instants,
     symbolic_physics,
 )
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands, track_directions
@@ -213,11 +214,13 @@ class ExportModel:
                 f"the tables of {self.predictor.method} hold {count} numbers, an export at most {MOST_NUMBERS}: "
                 "use fewer trees or units, larger leaves, or the method path-drawn"
             )
-        known = PredictorInputs(self.physics, self.layout)
-        physics, method = symbolic_physics(self.predictor.physics), self.predictor.method
-        alone = known.paths(physics)
+        inputs, layout, method = symbols_of(self.layout.sizes), self.layout, self.predictor.method
+        now, instants = split_by_name(layout.now, inputs["now"]), symbolic_instants(layout, inputs)
+        physics, moved = symbolic_physics(self.predictor.physics), symbolic_physics(self.physics)
+        given = ca.reshape(inputs["physics"], 2, layout.horizon).T if layout.physics else None
+        alone = physics.paths(instants) if given is None else ca.ArrayInterface.MX(given, shape=(layout.horizon, 1, 2))
         try:
-            predicted: Any = symbolic_corrector(corrector).predict(physics, known.instants, alone)
+            predicted: Any = symbolic_corrector(corrector).predict(physics, instants, alone)
             path = MX(predicted.reshape(physics.horizon, 2)).T
         except Exception as error:  # of a damaged file, of what CasADi's arrays lack of NumPy's, or in a user's code
             raise ShipidError(
@@ -226,22 +229,24 @@ class ExportModel:
                 "not have of NumPy"
             ) from error
         if is_user_code(type(corrector)):
-            self._check_by_numbers(known, alone, path)
-        inputs, outputs = (
-            dict(known.inputs),
-            {"path": path, "outside": ca.logic_or(self._outside(known), known.diverges)},
+            self._check_by_numbers(inputs, instants, alone, path)
+        alarm = self.predictor.alarm
+        raised = (
+            self._is_beyond_limits(now)
+            if alarm is None
+            else MX(alarm.is_raised(alarm_inputs(alarm.inputs, alarm.past, moved, instants)))
         )
+        diverges = MX(0) if moved.vessel is None else ca.logic_not(moved.is_slow(moved.records(instants)))
+        outputs = {"path": path, "outside": ca.logic_or(raised, diverges)}
         if bands is not None:
             choice = symbols_of(dict.fromkeys(BAND_CHOICE, 1))
             promised = is_band_promised(bands, **choice)
-            rows = band_rows(
-                bands, known.now, path, self.physics.step, half_axes_at(bands, **choice), known.instants.past
-            )
+            rows = band_rows(bands, now, path, self.physics.step, half_axes_at(bands, **choice), instants.past)
             inputs |= choice
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
         return function_by_names("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
 
-    def _check_by_numbers(self, known: PredictorInputs, alone: Any, path: MX) -> None:
+    def _check_by_numbers(self, inputs: NamedExpressions, instants: Instants, alone: Any, path: MX) -> None:
         """Raise ShipidError where `predict` gives another path on symbols than on numbers, at one drawn instant.
 
         alone : (T, 1, 2) of the physics. path : (2, T) that the method made of it. On arrays of three axes some
@@ -251,11 +256,11 @@ class ExportModel:
         for group, size in self.layout.sizes.items():
             ends = [self.limits.get(name, (0.0, 1.0)) for name in getattr(self.layout, group)]
             drawn.append(random.uniform(*np.resize(np.reshape(ends, (-1, 2)), (size, 2)).T))
-        change_arrays(known.instants, arrays.append)
+        change_arrays(instants, arrays.append)
         symbols = [path.T, *(MX(one.reshape(-1)) for one in (*arrays, alone))]
-        made, *rest = map(np.array, ca.Function("values", [*known.inputs.values()], symbols).call(drawn))
+        made, *rest = map(np.array, ca.Function("values", [*inputs.values()], symbols).call(drawn))
         numbers = (value.reshape(one.shape) for value, one in zip(rest, (*arrays, alone), strict=True))
-        given = change_arrays(known.instants, lambda _: next(numbers))
+        given = change_arrays(instants, lambda _: next(numbers))
         with locate_errors(f"{home.__name__}.predict", home):
             expected = self.predictor.corrector.predict(self.predictor.physics, given, next(numbers))
         if not np.allclose(made, expected.reshape(made.shape), rtol=1e-6, atol=1e-6, equal_nan=True):  # beyond rounding
@@ -264,14 +269,11 @@ class ExportModel:
                 "numbers: let it write to no array, and compute with arrays of one or two axes"
             )
 
-    def _outside(self, known: PredictorInputs) -> MX:
-        """Whether the alarm is raised: the calibrated one, or else by the limits."""
-        if self.predictor.alarm is not None:
-            alarm = self.predictor.alarm
-            return MX(alarm.is_raised(alarm_inputs(alarm.inputs, alarm.past, known.physics, known.instants)))
+    def _is_beyond_limits(self, now: NamedExpressions) -> MX:
+        """Whether the limits raise the alarm, where none is calibrated."""
         inside = MX(1 if self.limits else 0)
         for name, (low, high) in self.limits.items():
-            inside = ca.logic_and(inside, ca.logic_and(known.now[name] >= low, known.now[name] <= high))
+            inside = ca.logic_and(inside, ca.logic_and(now[name] >= low, now[name] <= high))
         return MX(ca.logic_not(inside))
 
     @cached_property

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from shipid.data.dataset import BREAK
 from shipid.data.windows import from_frame, to_frame
-from shipid.errors import DataError
+from shipid.errors import DataError, placed_errors
 
 INPUTS = {"latitude": "rad", "longitude": "rad", "speed": "m/s", "course": "rad"}
 """Columns of a mapping that become others: position on the Earth north and east, speed and course over ground u, v."""
@@ -312,10 +312,8 @@ def apply_repairs(
     for repair in repairs:
         count, note = 0, "switched off"
         if repair.enabled and repair.kind not in off:
-            try:
+            with placed_errors(DataError, file=file):
                 outcome = REPAIRS[repair.kind][1](rows, repair)
-            except DataError as error:
-                raise DataError(error.message, file=file, path=error.path) from None
             if outcome.rows.empty:
                 raise DataError(
                     f"no row is left ({outcome.note}): change it, or leave it out with --without {repair.kind}",

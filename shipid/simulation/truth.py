@@ -17,7 +17,7 @@ from shipid.capacity import excess_memory_words
 from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.document import requirement_words, taken_for_numbers
 from shipid.engine.integrate import Array, Method
-from shipid.errors import DocumentError, ShipidError, suggest_name
+from shipid.errors import DocumentError, ShipidError, placed_errors, suggest_name
 from shipid.physics.signals import ACTUAL, is_output, is_wrapped_angle, measurable_signals
 from shipid.simulation.approach import Controls
 from shipid.simulation.log import state_column
@@ -220,11 +220,9 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
         if truth.fmu is not None and KINDS[block.kind].reacts():
             words = f"the helmsman of {block.kind} steers {truth.vessel}, not the FMU: take a kind with given orders"
             raise DocumentError(words, path=f"truth.manoeuvre.{place}.kind")
-        try:
+        with placed_errors(DocumentError, path=partial(path_in_block, f"truth.manoeuvre.{place}")):
             for end in (0.0, 1.0):  # of every range
                 block.manoeuvre(truth.length, lambda _, end=end: end).check(controls)  # type: ignore[misc]
-        except DocumentError as error:
-            raise DocumentError(error.message, path=path_in_block(error.path, f"truth.manoeuvre.{place}")) from None
     if unknown is not None:
         raise DocumentError(f"no logged column: {suggest_name(unknown, columns)}", path=f"truth.sensors.{unknown}")
 
@@ -265,18 +263,16 @@ def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
         )
 
 
-def path_in_block(path: str | None, block: str) -> str:
+def path_in_block(block: str, path: str) -> str:
     """Path in a document of an error in one of its manoeuvres; one of the vessel, which is named, gets the block's."""
-    group, _, key = (path or "").partition(".")
+    group, _, key = path.partition(".")
     return f"{block}.{key}" if key and group == "manoeuvre" else block
 
 
 def truth_vessel(truth: Truth, vessel: Vessel) -> Vessel:
     """The vessel with the values and blocks of `truth.set`; DocumentError names the path of an error there."""
-    try:
+    with placed_errors(DocumentError, path="truth.set.{}".format):
         return vessel.with_values(truth.set) if truth.set else vessel
-    except DocumentError as error:
-        raise DocumentError(error.message, path=f"truth.set.{error.path}") from None
 
 
 def simulate_truth(
@@ -301,7 +297,7 @@ def simulate_truth(
         instants = np.arange(whole_steps(truth.length, truth.step) + 1, dtype=float)
         mean = environment["V_w"]
         environment["V_w"] = mean + gust_series(truth.gusts, mean, truth.step * instants, keys)
-    try:
+    with placed_errors(ShipidError, path="truth", into=DocumentError):
         frame = perform_manoeuvres(
             vessel,
             draw_manoeuvres(truth),
@@ -313,8 +309,6 @@ def simulate_truth(
             components=None if truth.waves is None else wave_loads(vessel, draw_components(truth.waves, chi, keys)),
             outputs=[name for name in truth.sensors if is_output(name)],
         )
-    except ShipidError as error:
-        raise DocumentError(error.message, path="truth") from None
     frame = perform(frame.drop(columns=[name for name in frame if str(name).startswith(ACTUAL)]))
     return measure_record(frame, truth.sensors, truth.interval, truth.seed) if truth.sensors else frame
 
@@ -370,7 +364,7 @@ def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
     """
     file = documents.find_document(name, "studies")
     document = documents.read_document(file)
-    try:
+    with placed_errors(ShipidError, file=file, path=str, into=DocumentError):
         if "truth" in document:
             raise DocumentError("is a study: simulate it by its name, with --set truth.vessel=...")
         script = documents.parse_model(Script, document, file)
@@ -382,8 +376,6 @@ def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
         if fault := excess_memory_words(instants * 2 * len(vessel_dynamics(vessel).commands)):
             raise DocumentError(f"{len(manoeuvres)} runs in steps of {script.step:g} s {fault}", path="step")
         frame = perform_manoeuvres(vessel, manoeuvres, step=script.step, interval=script.interval)
-    except ShipidError as error:
-        raise DocumentError(error.message, file=file, path=error.path) from None
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
 
 
@@ -396,10 +388,8 @@ def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
             raise DocumentError(f"{kind!r} is no kind of manoeuvre: {suggest_name(kind, KINDS)}", path=f"{where}.kind")
         rest = {key: value for key, value in block.items() if key != "kind"}
         one: Manoeuvre = documents.parse_model(KINDS[kind], rest, None, where)
-        try:
+        with placed_errors(DocumentError, path=partial(path_in_block, where)):
             one.check(controls)
-        except DocumentError as error:
-            raise DocumentError(error.message, path=path_in_block(error.path, where)) from None
         manoeuvres.append(one)
     return manoeuvres
 

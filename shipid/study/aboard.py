@@ -12,7 +12,7 @@ import pandas as pd
 from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
 from shipid.data.windows import coarse_in_words, gaps_in_words
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import DataError
+from shipid.errors import DataError, placed_errors
 from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
@@ -22,15 +22,13 @@ from shipid.report.content import SummaryLine
 from shipid.study.apply import (
     BandSettings,
     Forecast,
-    faults_of_log,
     instants_along,
     is_kind_new,
     limits_in_words,
     predict_instants,
-    read_or_import,
+    read_to_apply,
     tables_along,
 )
-from shipid.study.store import read_predictor
 from shipid.units import length_text, level_text, percent_text, plural_word
 
 TRACK_COLUMNS = ["run", "t", "north", "east"]
@@ -79,11 +77,8 @@ def play_aboard(
     Raises DataError where a command is missing, no run is as long as the past that is needed, or no band of the level
     can be promised.
     """
-    predictor = read_predictor(file)
-    if level is not None:
-        predictor.check_level(level, kind)
     band = None if level is None else BandSettings(level, kind, rate)
-    dataset = read_or_import(log, mapping, predictor.vessels)
+    predictor, dataset = read_to_apply(file, log, mapping, band)
     step = predictor.physics.step
     names = list(map(str, dataset.frame.columns))
     if every is not None and not every > 0:
@@ -93,7 +88,7 @@ def play_aboard(
         rows, early = _due_rows(piece["t"].to_numpy(), every or step, predictor.past * step)
         skipped += early
         if len(rows):
-            with faults_of_log(log):
+            with placed_errors(DataError, file=log):
                 forecast, latency = _forecast_row_by_row(predictor, dataset, piece, rows, band)
             path, one = tables_along(predictor, run, piece, forecast, band)
             points.append(path)

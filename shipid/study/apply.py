@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +28,7 @@ from shipid.data.windows import (
     is_without_rows,
     past_of_instants,
 )
-from shipid.errors import DataError, ResultError, suggest_name
+from shipid.errors import DataError, ResultError, placed_errors, suggest_name
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
 from shipid.hybrid.mean import MeanCorrector
@@ -104,12 +103,9 @@ def predict_log(
     may mislead.
     """
     check_table(out)
-    predictor = read_predictor(_find_cell_file(folder, cell))
-    if level is not None:
-        predictor.check_level(level, kind)
-    dataset = read_or_import(log, mapping, predictor.vessels)
     band = None if level is None else BandSettings(level, kind, rate)
-    with faults_of_log(log):
+    predictor, dataset = read_to_apply(_find_cell_file(folder, cell), log, mapping, band)
+    with placed_errors(DataError, file=log):
         tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in stretches_of_runs(dataset)]
     parts = [table for table in tables if len(table)]
     if not parts:
@@ -124,15 +120,6 @@ def predict_log(
     frame.attrs["errors"] = _errors_in_words(errors[:, np.isfinite(errors).all(axis=0)], step)
     frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step), "limits": limits}
     return frame, float(frame["outside"].mean())
-
-
-@contextmanager
-def faults_of_log(log: Path) -> Iterator[None]:
-    """Give a DataError of the block the file of the log."""
-    try:
-        yield
-    except DataError as error:
-        raise DataError(error.message, file=error.file or log, path=error.path) from None
 
 
 def table_of_stretch(
@@ -177,6 +164,14 @@ def _errors_in_words(error: Array, step: float) -> str:
         f"{len(error) * step:g} s ahead predictions err by {end} m on average, nine in ten below {end_90} m; mean over "
         f"the horizon {mean} m ({count} {plural_word(count, 'path')} that the log holds whole)"
     )
+
+
+def read_to_apply(file: Path, log: Path, mapping: str | None, band: BandSettings | None) -> tuple[Predictor, Dataset]:
+    """A predictor, which has the band, and a log with what it needs."""
+    predictor = read_predictor(file)
+    if band is not None:
+        predictor.check_level(band.level, band.kind)
+    return predictor, read_or_import(log, mapping, predictor.vessels)
 
 
 def read_or_import(log: Path, mapping: str | None, vessels: Sequence[Vessel]) -> Dataset:

@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset
-from shipid.errors import DocumentError, ShipidError, suggest_name
+from shipid.errors import DocumentError, ShipidError, placed_errors, suggest_name
 from shipid.foundations import SIMULATORS
 from shipid.hybrid.method import Method, misfit_words
 from shipid.hybrid.methods import method_of
@@ -258,10 +258,8 @@ def _observer(study: Study, family: Family, index: int, vessel: Vessel) -> Obser
     coarse, prefix = study.data is not None and study.data.path == "velocity", f"family.{index}.observer"
     default: dict[str, Any] = {"measured": ["psi", "u", "v", "r"], "current": 0.0} if coarse else {}
     settings: Observer = documents.parse_model(Observer, default | (family.observer or {}), None, prefix)
-    try:
+    with placed_errors(DocumentError, path=prefix):
         filter_bank(vessel, settings)
-    except DocumentError as error:
-        raise DocumentError(error.message, path=prefix) from None
     return settings
 
 
@@ -272,10 +270,8 @@ def _identify(study: Study, family: Family, index: int, vessel: Vessel) -> Ident
     settings: Identify = documents.parse_model(
         Identify, default | (family.identify or {}), None, prefix
     ).with_current_named()
-    try:
+    with placed_errors(DocumentError, path=lambda path: (path or "identify").replace("identify", prefix, 1)):
         free_factors(vessel, settings)
-    except DocumentError as error:
-        raise DocumentError(error.message, path=(error.path or "identify").replace("identify", prefix, 1)) from None
     return settings
 
 

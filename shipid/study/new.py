@@ -22,7 +22,7 @@ from shipid import document as documents
 from shipid.data.checks import check_dataset, way_not_travelled
 from shipid.data.dataset import Dataset, read_dataset, stretches_by_run, stretches_of_runs
 from shipid.data.windows import cut_windows
-from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
+from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError, placed_errors
 from shipid.hybrid.physics import check_columns
 from shipid.identification.diagnosis import NONE, Diagnosis, diagnose
 from shipid.physics.signals import SIGNALS, drive_scale, is_steering, signal_of
@@ -434,10 +434,8 @@ def draft_simulated(
     service, controls = vessel_service_speed(vessel), Controls(vessel)
     if not controls.differential:
         _ = controls.helm  # DocumentError where nothing turns the ship
-    try:
+    with placed_errors(ShipidError, file=vessel.file, path="particulars.U_0", into=DocumentError):
         rpm = shaft_speed(controls, service) / RPM
-    except ShipidError as error:
-        raise DocumentError(error.message, file=vessel.file, path="particulars.U_0") from None
     horizon, why = horizon_of(length, 0.75 * service, [np.inf], lengths)
     step = horizon / steps if steps else step_of(horizon, 0.0)
     ahead = round(horizon / step) * step

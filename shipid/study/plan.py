@@ -19,7 +19,7 @@ from shipid import document as documents
 from shipid.arguments import check_mapping
 from shipid.capacity import excess_memory_words
 from shipid.document import Document
-from shipid.errors import DataError, DocumentError, suggest_name
+from shipid.errors import DataError, DocumentError, placed_errors, suggest_name
 from shipid.files import quote_argument
 from shipid.foundations.function import SimulatorFunction
 from shipid.hybrid.simulated import Simulator
@@ -472,12 +472,10 @@ def _changed_document(document: Document, changes: Mapping[str, Any], where: str
     """A document with changes; DocumentError that names `where` and the path of a change that reaches nothing."""
     for path, value in changes.items():
         head = str(path).split(".", 1)[0]
-        try:
+        with placed_errors(DocumentError, path=f"{where}{path}"):
             if head not in blocks:
                 raise DocumentError(f"no such block: {suggest_name(head, blocks)}")
             document = documents.replace_values(document, {path: value})
-        except DocumentError as error:
-            raise DocumentError(error.message, path=f"{where}{path}") from None
     return document
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -44,7 +44,7 @@ from shipid.data.windows import (
     windows_over_spans,
 )
 from shipid.engine.casadi import memory_along
-from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
+from shipid.errors import DataError, DivergenceError, DocumentError, placed_errors, suggest_name
 from shipid.foundations.fmu import SimulatorFmu
 from shipid.hybrid.features import count_steps
 from shipid.hybrid.method import Case, Task
@@ -141,20 +141,11 @@ class PreparedStudy:
         return run_folds(windows, validation, batch.seed, self.study.split.folds)
 
 
-@contextmanager
-def _name_study_file(plan: Plan) -> Iterator[None]:
-    """Name the file of the study in an error that names none."""
-    try:
-        yield
-    except DocumentError as error:
-        raise type(error)(error.message, file=error.file or plan.file, path=error.path) from None
-
-
 def obtain_runs(plan: Plan) -> Dataset:
     """The runs of a study: simulated by its truth, imported from its log, or read."""
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
-        with _name_study_file(plan):
+        with placed_errors(DocumentError, file=plan.file):
             frame = _simulate(plan, study.truth, plan.truth)
         runs = map(str, frame["run"].unique())
         kinds = {run: kind_in_name(kind_name(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
@@ -181,7 +172,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
 
     Raises DocumentError where the runs do not suffice.
     """
-    with _name_study_file(plan):
+    with placed_errors(DocumentError, file=plan.file):
         windows = all_windows(plan, dataset)
         is_test = np.isin(windows.run, _test_runs(plan.study, windows))
         test, rest = _against_truth(plan, windows.select(is_test)), windows.select(~is_test)
@@ -259,10 +250,8 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     if fault := excess_memory_words(float(count * each)):
         words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval {fault}"
         raise DocumentError(words, path="prediction.interval")
-    try:
+    with placed_errors(DataError, path="prediction.ahead", into=DocumentError):
         windows = cut(dataset)
-    except DataError as error:
-        raise DocumentError(error.message, path="prediction.ahead") from None
     if study.data is not None and study.data.causal:
         known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
         windows = replace(windows, columns=known.columns, past=known.past)
@@ -306,7 +295,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
                 file=plan.file,
                 path=f"method.{way.name}.memory.states",
             )
-    with _name_study_file(plan):
+    with placed_errors(DocumentError, file=plan.file):
         known = _roll_out(plan, dataset, [rest, test], notes, device)
     return PreparedStudy(
         study=plan.study,
@@ -402,10 +391,8 @@ def known_by_then(study: Study, dataset: Dataset) -> Dataset:
     """The runs as a predictor sees them: columns that the study calls `causal` hold their last fix."""
     if study.data is None or not study.data.causal:
         return dataset
-    try:
+    with placed_errors(DataError, path="data.causal", into=DocumentError):
         return causal_columns(dataset, study.data.causal)
-    except DataError as error:
-        raise DocumentError(error.message, path="data.causal") from None
 
 
 def path_source(study: Study) -> PathSource:
