@@ -155,13 +155,8 @@ def import_log(
         frame = pd.concat(
             [_name_run(rows, name) for name, (_, rows) in zip(names, pieces, strict=True)], ignore_index=True
         )
-    elif mapping.source.runs is None:
-        unit, t = to_si(mapping.clock.unit, "t"), rows["t"]
-        whole = Segment(run=clean_name(source.stem), start=t.iloc[0] / unit, end=t.iloc[-1] / unit)
-        frame, outside = _cut_into_runs(rows, mapping.segment or (whole,), unit, source)
-        repairs += outside
     else:
-        frame, outside = _cut_files(mapping, each, logs)
+        frame, outside = _cut_into_runs(mapping, each, logs)
         repairs += outside
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
@@ -494,9 +489,34 @@ def _estimate_velocities(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tu
 
 
 def _cut_into_runs(
-    rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path
+    mapping: Mapping, each: list[tuple[str, ImportedLog]], logs: PlainMapping[str, Path]
 ) -> tuple[pd.DataFrame, Records]:
-    """Put the runs one after another, and count the rows in none; rows that belong to two runs are repeated."""
+    """The runs of all files: the segments of each, the whole file where it has none; rows in none are counted."""
+    unit, frames, left = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), 0
+    for index, one in enumerate(mapping.segment if mapping.source.runs is not None else ()):
+        if one.file not in logs or one.run in logs.keys() - {cut.file for cut in mapping.segment}:
+            file, path = next(iter(logs.values())).parent, f"segment.{index}"
+            if one.file in logs:
+                raise DataError(f"a run {one.run!r} exists, a whole file: take another name", file=file, path=path)
+            raise DataError(
+                f"no file {one.file!r}: {suggest_name(str(one.file), logs)}", file=file, path=f"{path}.file"
+            )
+    for run, part in each:
+        inside = [one for one in mapping.segment if one.file in (run, None)]
+        runs, outside = (
+            _cut_segments(part.rows, inside, unit, logs[run]) if inside else ([_name_run(part.rows, run)], 0)
+        )
+        frames += runs
+        left += outside
+    rows = sum(len(part.rows) for _, part in each)
+    record = {"kind": "left out", "column": "", "count": left, "note": f"of {rows} rows: in no segment"}
+    return frames[0] if len(frames) == 1 else pd.concat(frames, ignore_index=True), [record] if left else []
+
+
+def _cut_segments(
+    rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path
+) -> tuple[list[pd.DataFrame], int]:
+    """The rows of each segment, named by its run, and the number of rows in none; those of two are repeated."""
     t = rows["t"].to_numpy()
     slack, step = clock_slack(t), float(np.median(np.diff(t)))
     runs, outside = [], np.ones(len(t), dtype=bool)
@@ -510,34 +530,7 @@ def _cut_into_runs(
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_name_run(part, segment.run))
         outside &= ~inside
-    record = {"kind": "left out", "column": "", "count": int(outside.sum()), "note": f"of {len(t)} rows: in no segment"}
-    frame = runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
-    return frame, [record] if outside.any() else []
-
-
-def _cut_files(
-    mapping: Mapping, each: list[tuple[str, ImportedLog]], logs: PlainMapping[str, Path]
-) -> tuple[pd.DataFrame, Records]:
-    """The runs of several files: the segments of each, the whole file where it has none; rows in none are counted."""
-    unit, frames, left = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), 0
-    for index, one in enumerate(mapping.segment):
-        if one.file not in logs or one.run in logs.keys() - {cut.file for cut in mapping.segment}:
-            file, path = next(iter(logs.values())).parent, f"segment.{index}"
-            if one.file in logs:
-                raise DataError(f"a run {one.run!r} exists, a whole file: take another name", file=file, path=path)
-            raise DataError(
-                f"no file {one.file!r}: {suggest_name(str(one.file), logs)}", file=file, path=f"{path}.file"
-            )
-    for run, part in each:
-        inside = [one for one in mapping.segment if one.file == run]
-        frame, outside = (
-            _cut_into_runs(part.rows, inside, unit, logs[run]) if inside else (_name_run(part.rows, run), [])
-        )
-        frames.append(frame)
-        left += sum(one["count"] for one in outside)
-    rows = sum(len(part.rows) for _, part in each)
-    record = {"kind": "left out", "column": "", "count": left, "note": f"of {rows} rows: in no segment"}
-    return pd.concat(frames, ignore_index=True), [record] if left else []
+    return runs, int(outside.sum())
 
 
 def _split_runs(log: ImportedLog, name: str) -> Iterator[tuple[str, pd.DataFrame]]:
