@@ -504,7 +504,7 @@ def _cut_into_runs(
     for run, part in each:
         inside = [one for one in mapping.segment if one.file in (run, None)]
         runs, outside = (
-            _cut_segments(part.rows, inside, unit, logs[run]) if inside else ([_name_run(part.rows, run)], 0)
+            _segment_runs(part.rows, inside, unit, logs[run]) if inside else ([_name_run(part.rows, run)], 0)
         )
         frames += runs
         left += outside
@@ -513,7 +513,7 @@ def _cut_into_runs(
     return frames[0] if len(frames) == 1 else pd.concat(frames, ignore_index=True), [record] if left else []
 
 
-def _cut_segments(
+def _segment_runs(
     rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path
 ) -> tuple[list[pd.DataFrame], int]:
     """The rows of each segment, named by its run, and the number of rows in none; those of two are repeated."""
