@@ -165,7 +165,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         missing = [*_words_for_nothing(table, columns, model), *_missing_value_texts(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
-            model = model.model_copy(update={"missing": tuple(form["missing"])})
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
     made = _degree_columns(columns) | _quaternion_columns(columns)
     made |= {name: ((source,), values) for name, (source, values) in in_text.items() if name != source}
