@@ -169,11 +169,12 @@ def _choose_clock(
 
 def _clocks_by_name(table: pd.DataFrame, columns: dict[str, Array]) -> Iterator[dict[str, Any]]:
     """Yield keys of clocks, the surest first: of two columns, of texts, of fields, of numbers that are called so."""
-    for name, other in itertools.permutations(columns, 2):  # whole seconds and the rest of them, as ROS and C write
-        begin = re.fullmatch(r"(.*?)_?(?:secs?|seconds?)", name)
-        rest = re.fullmatch(rf"{re.escape(begin[1])}_?(n|u)(?:ano|icro)?secs?(?:onds?)?", other) if begin else None
-        if rest and are_whole(columns[name], LAST_DATE) and columns[other].max() * RESTS[f"s + {rest[1]}s"] < 1.0:
-            yield {"from": [name, other], "unit": f"s + {rest[1]}s"}
+    begins = [(name, re.fullmatch(r"(.*?)_?(?:secs?|seconds?)", name)) for name in columns]
+    for (name, begin), other in itertools.product([one for one in begins if one[1]], columns):  # as ROS and C write it
+        rest = re.fullmatch(rf"{re.escape(begin[1] if begin else '')}_?(n|nano|u|micro)secs?(?:onds?)?", other)
+        unit = "s + ns" if rest and rest[1][0] == "n" else "s + us"
+        if rest and are_whole(columns[name], LAST_DATE) and columns[other].max() * RESTS[unit] < 1.0:
+            yield {"from": [name, other], "unit": unit}
     fields, dates = _date_fields(columns), _date_column(table, columns)
     ways = (("year", "month", "day"), ("year", "day of the year"))
     days = dates or next(([fields[one] for one in way] for way in ways if {*way} <= fields.keys()), None)

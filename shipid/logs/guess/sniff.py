@@ -165,7 +165,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         missing = [*_words_for_nothing(table, columns, model), *_missing_value_texts(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
-            model = model.model_copy(update={"missing": tuple(form["missing"])})
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
     made = _degree_columns(columns) | _quaternion_columns(columns)
     made |= {name: ((source,), values) for name, (source, values) in in_text.items() if name != source}
@@ -326,9 +325,9 @@ Made = dict[str, tuple[tuple[str, ...], Array]]
 
 def _degree_columns(columns: dict[str, Array]) -> Made:
     """Latitudes and longitudes in columns of whole degrees, minutes and perhaps seconds, by the names of all."""
-    found: Made = {}
-    for place, count in itertools.product(range(len(columns)), (3, 2)):
-        parts = tuple(columns)[place : place + count]
+    found, names = Made(), tuple(columns)
+    for place, count in itertools.product(range(len(names)), (3, 2)):
+        parts = names[place : place + count]
         meant = next((one for one in ("latitude", "longitude") if meaning_scores(parts[0]).get(one, 0.0) > 0.5), None)
         used = {part for others, _ in found.values() for part in others}
         if meant and len(parts) == count and not used & {*parts} and _are_parts_of_angle(columns, parts, meant):

@@ -115,20 +115,20 @@ def _file_patterns(path: Path) -> tuple[Path, list[str]]:
     """Folder and patterns of a folder or glob, that of most files first; a file has no pattern."""
     text = path.as_posix()
     if "*" in text and not path.exists():
-        before = text[: text.index("*")]
-        folder, slash, _ = before.rpartition("/")
+        folder, slash, _ = text[: text.index("*")].rpartition("/")
         return Path(folder or ("/" if slash else ".")), [text[len(folder) + len(slash) :]]
     if not path.is_dir():
         return path, []
-    files: dict[str, list[Path]] = {}
-    for file in path.rglob("*"):
-        if file.is_file() and file.suffix.lower() in ENDINGS:
-            files.setdefault(file.suffix, []).append(file)
-    if not files:
+    logs = [file for file in path.rglob("*") if file.is_file() and file.suffix.lower() in ENDINGS]
+    if not logs:
         raise DataError(f"cannot be read: a folder without a log ({', '.join(ENDINGS)})", file=path)
+    endings = dict.fromkeys(file.suffix for file in logs)
+    files = {ending: [file for file in logs if file.suffix == ending] for ending in endings}
     size = {ending: (len(some), sum(file.stat().st_size for file in some)) for ending, some in files.items()}
     deep = {ending: "" if all(file.parent == path for file in some) else "**/" for ending, some in files.items()}
-    return path, [f"{deep[ending]}*{ending}" for ending in sorted(files, key=lambda ending: size[ending], reverse=True)]
+    return path, [
+        f"{deep[ending]}*{ending}" for ending in sorted(endings, key=lambda ending: size[ending], reverse=True)
+    ]
 
 
 def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str, str]) -> dict[Path, LogTable]:

@@ -346,6 +346,7 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
         (("header.stamp.secs", "header.stamp.nsecs"), "s + ns", 1e-9),
         (("stamp.sec", "stamp.nanosec"), "s + ns", 1e-9),
         (("tv_sec", "tv_usec"), "s + us", 1e-6),
+        (("seconds", "microseconds"), "s + us", 1e-6),
     ],
 )
 def test_a_clock_in_two_columns_is_read_beside_one_that_goes_back(
