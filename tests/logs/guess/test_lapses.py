@@ -41,7 +41,7 @@ def test_what_may_be_an_order_is_asked_and_stays_as_it_is(tmp_path: Path) -> Non
     proposal = guess_of(tmp_path, frame)
     (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
     assert found.columns == ("rpm",)
-    words = "Was that ordered? Unless it was ordered, switch the repair on"
+    words = "Was that ordered? Unless it was so, switch the repair on"
     asked = [one.sentence for one in proposal.questions if words in one.sentence]
     assert len(asked) == 1
     assert "'rpm' is 0 in 9 rows at 3 places" in asked[0]
@@ -61,4 +61,4 @@ def test_lapses_in_files_of_a_folder_are_asked(tmp_path: Path) -> None:
     (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
     (asked,) = (one for one in proposal.questions if "'rpm' is 0" in one.sentence)
     assert found.repair is None
-    assert asked.sentence.endswith("Unless it was ordered, leave these cells empty, and draft again")
+    assert asked.sentence.endswith("Unless it was so, leave these cells empty, and draft again")
