@@ -17,8 +17,7 @@ from shipid.logs.mapping import (
     OF_SHIP,
     degrees_and_minutes,
     degrees_in_parts,
-    degrees_in_text,
-    degrees_to_sides,
+    degrees_to_side,
     quaternion_size,
     quaternion_yaw,
     rate_of_ais,
@@ -112,72 +111,64 @@ def parse_numbers(
     sides : letters of an angle in degrees, such as 59°26'12.3"N. units : of which one may stand behind every number.
     """
     column = log_column(log, source, file, path)
-    if pd.api.types.is_numeric_dtype(column.dtype):
+    numeric = pd.api.types.is_numeric_dtype(column.dtype)
+    text = column if numeric else column.fillna("").astype(str).str.strip()
+
+    def refuse(wrong: Any, what: str, remedy: str = "") -> None:
+        rows = np.flatnonzero(wrong)
+        if len(rows):
+            message = f"{text.iloc[rows[:1]].tolist()[0]!r} {what} (column {source!r}; {len(rows)} such rows){remedy}"
+            raise DataError(message, file=file, path=row_in_words(log, rows[0]))
+
+    if numeric:
         numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
-        infinite = np.flatnonzero(np.isinf(numbers))
-        if len(infinite):
-            raise DataError(
-                f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)",
-                file=file,
-                path=row_in_words(log, infinite[0]),
-            )
+        refuse(np.isinf(numbers), "is no number")
         return numbers
     read = form if isinstance(form, TableFormat) else TextFormat()
-    text = column.fillna("").astype(str).str.strip()
+    if read.decimal == "," and read.thousands is None:
+        pointed = text.str.contains(".", regex=False)
+        if text[pointed].str.fullmatch(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?").all():  # 1.250 may be 1250
+            refuse(
+                pointed,
+                "has a point, and the decimal is a comma",
+                ": is it a mark of thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write "
+                "a comma there",
+            )
     missing = text.isin(read.missing)
-    if read.decimal == "," and read.thousands is None and (grouped := _row_of_thousands_mark(text)) is not None:
-        raise DataError(
-            f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
-            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there",
-            file=file,
-            path=row_in_words(log, grouped),
-        )
-    plain = in_points(text, read.decimal, read.thousands).mask(missing)
-    numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
-    if units and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
+    numbers = text_numbers(text.mask(missing), read.decimal, read.thousands)
+    if units and np.any(~np.isfinite(numbers) & ~missing):
         bare, behind = split_amounts(text)
-        own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).to_numpy(dtype=bool)
-        other = np.flatnonzero(behind.ne("").to_numpy() & ~own & ~missing.to_numpy())
-        if len(other) and not sides:
-            raise DataError(
-                f"{text.iloc[other[0]]!r} is not in {units[0]}, as the mapping has it (column {source!r}; {len(other)} "
-                "such rows): write one unit in the whole column",
-                file=file,
-                path=row_in_words(log, other[0]),
-            )
+        own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).astype(bool)
+        refuse(
+            behind.ne("") & ~own & ~missing & (not sides),
+            f"is not in {units[0]}, as the mapping has it",
+            ": write one unit in the whole column",
+        )
         north = behind.where(own, "").map(north_reference)
-        if {"T", "M"} <= {*north}:
-            kind = {"T": "true", "M": "magnetic"}[north[north.ne("")].iloc[0]]
-            other = np.flatnonzero(north.isin({"T", "M"} - {kind[0].upper()}))
-            raise DataError(
-                f"{text.iloc[other[0]]!r} is not of {kind} north, as those before it (column {source!r}; {len(other)} "
-                "such rows): write one north in the whole column",
-                file=file,
-                path=row_in_words(log, other[0]),
-            )
+        first = next(filter(None, north), "")
+        refuse(
+            north.ne("") & north.ne(first),
+            f"is not of {'true' if first == 'T' else 'magnetic'} north, as those before it",
+            ": write one north in the whole column",
+        )
         text = bare.where(own, text)
         missing |= text.isin(read.missing)
-        plain = in_points(text, read.decimal, read.thousands).mask(missing)
-        numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
-    if sides and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
+        numbers = text_numbers(text.mask(missing), read.decimal, read.thousands)
+    if sides and np.any(~np.isfinite(numbers) & ~missing):
         words = in_points(text, read.decimal, None).mask(missing)
-        angles = degrees_to_sides(words) if sides == OF_SHIP else degrees_in_text(words, sides)
+        angles = degrees_to_side(words, sides)
         if sides != OF_SHIP or np.isfinite(angles).sum() > np.isfinite(numbers).sum():
             numbers = angles
-    bad = np.flatnonzero(~np.isfinite(numbers) & ~missing.to_numpy())
-    if len(bad):
-        kind = "angle" if sides == OF_SHIP else "position"
-        what = f"no number and no {kind} with {' or '.join(sides)}" if sides else "no number"
-        message = (
-            f"{text.iloc[bad[0]]!r} is {what} (column {source!r}; {len(bad)} such rows): "
-            "correct it, or list it in [format] missing, or check decimal and thousands"
-        )
-        raise DataError(message, file=file, path=row_in_words(log, bad[0]))
+    sided = f" and no {'angle' if sides == OF_SHIP else 'position'} with {' or '.join(sides)}" if sides else ""
+    refuse(
+        ~np.isfinite(numbers) & ~missing,
+        f"is no number{sided}",
+        ": correct it, or list it in [format] missing, or check decimal and thousands",
+    )
     return numbers
 
 
-def _row_of_thousands_mark(text: pd.Series[Any]) -> int | None:
-    """The first row whose point may mark thousands, 1.250 for 1250; None where a point of a column may not."""
-    pointed = text.str.contains(".", regex=False)
-    groups = text.str.fullmatch(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
-    return int(np.argmax(pointed)) if pointed.any() and groups[pointed].all() else None
+def text_numbers(text: pd.Series[Any], decimal: str, thousands: str | None) -> NDArray[np.float64]:
+    """Texts (N,) as numbers, NaN for what is none."""
+    numbers = pd.to_numeric(in_points(text, decimal, thousands), errors="coerce")
+    return numbers.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)

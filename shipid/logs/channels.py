@@ -142,9 +142,6 @@ def close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[p
     if broken.any():
         note = f"gaps longer than {max_gap:g} s"
         records.append({"kind": BREAK, "column": "", "count": int(broken.sum()), "note": note})
+        flags[np.flatnonzero(~removed)[broken]] |= 1 << FLAGS.index(BREAK)
     rows = rows.assign(**filled, flags=flags)
-    if removed.any():
-        rows = rows.loc[~removed].reset_index(drop=True)
-    if broken.any():
-        rows = rows.assign(flags=rows["flags"] | np.where(broken, 1 << FLAGS.index(BREAK), 0))
-    return rows, records
+    return (rows.loc[~removed].reset_index(drop=True) if removed.any() else rows), records

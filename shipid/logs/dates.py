@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from datetime import UTC, datetime
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.data.dataset import FIRST_DATED_TIME, Array
 
@@ -16,7 +17,9 @@ DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
 WEEKS = 7 * 1024  # days after which the week number of GPS begins again
-TIME_OF_DAY = r"\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?(\s*[AaPp][Mm])?\s*"
+TIME_OF_DAY = r"\s*(\d\d?):(\d\d)(?::(\d\d(?:[.,]\d+)?))?\s*([AaPp][Mm])?\s*"
+MOMENT = rf"^(?:(.*?\S)[\sT:/_-]+)??{TIME_OF_DAY}$"
+"""A date, if there is one, and a time of day: its groups are these, hour, minute, second, and half of the day."""
 DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
 )
@@ -28,18 +31,14 @@ FRACTION = r"0|0?\.\d+|\d(?:\.\d+)?[eE]-\d+"
 """A time of day as a part of a day."""
 UTC_BEHIND = r"\s+(?:UTC|GMT)$"
 """The end of a date that says in letters that it has no other zone."""
-COMPACT = r"(\d{8})[-_ ]?(\d{6})(?:\.?(\d{1,8})\d?)?"
+COMPACT = r"(\d{4})(\d\d)(\d\d)[-_ ]?(\d\d)(\d\d)(\d\d)(?:\.?(\d{1,8})\d?)?"
 """A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
-JOINED = (
-    (r"(\d{4})[-:/ ](\d{3})[-:/ T](\d\d:\d\d:\d\d(?:\.\d+)?)Z?", r"\1 \2 \3", "%Y %j %H:%M:%S"),
-    (COMPACT, r"\1 \2.\g<3>0", "%Y%m%d %H%M%S.%f"),
-)
-"""How dates are joined with times of day, with blanks between them, and how these are then written: with the day of the
-year, 2024-135 08:00:00 or 2024:135:08:00:00.5, or in one number."""
 DURATION = (
     r"[+-]?\d+(?:\.\d+)? ?(?:d|days?|h|hrs?|hours?|min|minutes?|s|secs?|seconds?|ms)(?: \+?\d+:\d\d:\d\d(?:\.\d+)?)?"
 )
 """A time since the begin of a log as MATLAB and pandas write it: 0.5 sec, 0 days 00:00:00.5."""
+ISO = r"\d{4}-\d\d-\d\d[T ][\d:.]+\s*(?:Z|[+-][\d:]+)?"
+"""A date and a time of day in ISO 8601."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
 _SAID = re.compile(
@@ -56,13 +55,20 @@ _SAID_OF_CLOCK = re.compile(
 )
 """A zone in letters, in the name of a clock alone."""
 ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
-DAYS: tuple[str, ...] = ("%d.%m.%Y", "%d.%m.%y", "%Y/%m/%d", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y")
-DAYS += ("%d-%m-%Y", "%m-%d-%Y", "%y/%m/%d", "%d-%b-%Y", "%d %b %Y")
-HOURS = ("%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
-WAYS = (*(f"{day} {hour}" for day in DAYS for hour in HOURS), *(f"%Y-%m-%d {hour}" for hour in HOURS if "%p" in hour))
-"""Ways in which a date and a time of day may be written, but for ISO 8601."""
+DAYS = (
+    "%Y-%m-%d",
+    "%Y-%j",
+    "%d.%m.%Y",
+    "%d.%m.%y",
+    "%d-%m-%Y",
+    "%m-%d-%Y",
+    "%d-%m-%y",
+    "%m-%d-%y",
+    "%y-%m-%d",
+    "%d-%b-%Y",
+)
+"""Ways in which a date may be written, with - for any other mark than a point."""
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
-SAMPLES = 60  # texts by which the way of writing is looked for
 
 
 def other_zone(head: str, clock: str, first: str) -> str:
@@ -76,85 +82,59 @@ def other_zone(head: str, clock: str, first: str) -> str:
 def parse_dates(dates: pd.Series[Any]) -> Array:
     """Dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
-    Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`: of those that every row can be, that with
-    which the log is shorter, else day/month. NaN where there is none, or no zone while others have one.
+    Read are ISO 8601, dates and durations of pandas, and `DAYS` with a `TIME_OF_DAY`: as most rows are. NaN where there
+    is none, or no zone while others have one.
     """
     if isinstance(dates.dtype, pd.CategoricalDtype):
         dates = dates.astype(object)
     if pd.api.types.is_timedelta64_dtype(dates.dtype):
         return np.array(dates.dt.total_seconds(), dtype=np.float64)
-    if pd.api.types.is_numeric_dtype(dates.dtype) and in_one_number(dates.to_numpy(dtype=np.float64, na_value=np.nan)):
+    if pd.api.types.is_numeric_dtype(dates.dtype) and are_in_one_number(dates.to_numpy(np.float64, na_value=np.nan)):
         dates = dates.map(lambda one: f"{one:.16g}")
-    if pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object:
-        texts = dates.dropna().astype(str).str.strip()
-        if texts.str.contains(",", regex=False).any():
-            texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".")
-        if len(texts) and texts.str.contains(UTC_BEHIND).all():
-            texts = texts.str.replace(UTC_BEHIND, "", regex=True)
-            dates = texts.reindex(dates.index)
-        if len(texts) and texts.str.fullmatch(TIME_OF_DAY).all():
-            return _since_midnight(dates)
-        if len(texts) and texts.str.fullmatch(DURATION).all():
-            since = pd.to_timedelta(texts, errors="coerce").dt.total_seconds()
-            return np.array(since.reindex(dates.index), dtype=np.float64)
-        for form, parts, way in JOINED:
-            if len(texts) and texts.str.fullmatch(form).all():
-                joined = texts.str.replace(form, parts, regex=True)
-                return _since_1970(_parse_moments(joined, way).reindex(dates.index))
-        written = date_formats(texts)
-        if written:
-            moments = min(
-                (_parse_moments(texts, one) for one in written),
-                key=lambda one: (int(one.isna().sum()), float((one.max() - one.min()).total_seconds())),
-            )
-            return _since_1970(moments.reindex(dates.index))
+    if not (pd.api.types.is_string_dtype(dates.dtype) or dates.dtype == object):
+        return _since_1970(dates)
+    texts = dates.dropna().astype(str).str.strip()
+    if texts.str.contains(",", regex=False).any():
+        texts = texts.str.replace(r",\s+", " ", regex=True).str.replace(",", ".", regex=False)
+    if texts.str.fullmatch(COMPACT).any():
+        texts = texts.str.replace(f"^{COMPACT}$", r"\1-\2-\3 \4:\5:\6.\g<7>0", regex=True)
+    if texts.str.contains(UTC_BEHIND).all():
+        texts = texts.str.replace(UTC_BEHIND, "", regex=True)
+    since = np.full(len(texts), np.nan)
+    if texts.str.fullmatch(DURATION).all():
+        since = np.array(pd.to_timedelta(texts, errors="coerce").dt.total_seconds())
+    elif not texts.str.fullmatch(ISO).mean() > 0.5 and (found := texts.str.extract(MOMENT))[1].notna().mean() > 0.5:
+        hour, minute, second = (pd.to_numeric(found[place]) for place in (1, 2, 3))
+        since, half = (3600.0 * hour + 60.0 * minute + second.fillna(0.0)).to_numpy(np.float64), found[4].str.lower()
+        of_day = np.where(half.isna(), since, since % HALF_DAY + HALF_DAY * half.eq("pm"))  # 12 AM is midnight
+        alone = found[0].isna()
+        of_one = over_midnights(np.where(alone, of_day, np.nan))
+        since = of_one if alone.mean() > 0.5 else day_readings(found[0])[0] + of_day
+    else:
         zoned = texts.str.contains(ZONE)
-        dates = (texts[zoned] if zoned.any() else texts).reindex(dates.index)
-    return _since_1970(pd.to_datetime(dates, format="ISO8601", utc=True, errors="coerce"))
+        since = _since_1970(texts.where(zoned | (not zoned.any())))
+    return np.array(pd.Series(since, texts.index).reindex(dates.index), dtype=np.float64)
 
 
-def in_one_number(values: Array) -> bool:
-    """Whether numbers (N,) are dates and times of day, as 20240514080000 is: year, month, day, hour, minute, second."""
-    if not len(values) or not np.all((values > 1.9e13) & (values < 2.1e13)):
-        return False
-    fields = ((values // 10.0**place % 100).astype(int) for place in (8, 6, 4, 2, 0))
-    limits = ((1, 12), (1, 31), (0, 23), (0, 59), (0, 60))
-    return all(bool(np.all((one >= low) & (one <= high))) for one, (low, high) in zip(fields, limits, strict=True))
+def are_in_one_number(values: Array) -> bool:
+    """Whether numbers (N,) may be dates and times of day, as 20240514080000 is."""
+    return bool(len(values) and np.all((values > 1.9e13) & (values < 2.1e13)))
 
 
-def date_formats(texts: pd.Series[Any]) -> list[str]:
-    """Ways in which dates (N,) of text may be written, none for ISO 8601: most of a sample can be read so."""
-    places = np.random.default_rng(0).integers(0, max(1, len(texts)), SAMPLES)  # a stride may meet one kind
-    some = texts.iloc[np.unique(places)] if len(texts) else texts
-    some = some[some.str.fullmatch(rf"(?:{DAY_OF})\s+{TIME_OF_DAY}")]
-    shown = some.tolist()
-    ways = [
-        one for one in WAYS if sum(_date_pattern(one).fullmatch(text) is not None for text in shown) > 0.5 * len(some)
+def day_readings(days: pd.Series[Any]) -> list[Array]:
+    """Dates (N,) of text as seconds since 1970, NaN for none, in each way that reads most of them.
+
+    Of several those with which the log is shortest, day/month first; one of NaN alone where no way reads them.
+    """
+    places, known = pd.factorize(days)
+    texts = pd.Series(known, dtype="str").str.replace(r"[/ :_]+", "-", regex=True)
+    moments = (pd.Series(pd.to_datetime(texts, format=way, utc=True, errors="coerce")) for way in DAYS)
+    read = (np.append(_since_1970(one), np.nan)[places] for one in moments)
+    readings = [one for one in read if np.isfinite(one).sum() > 0.5 * len(one)]
+    sizes = [(int(np.isnan(one).sum()), float(np.nanmax(one) - np.nanmin(one))) for one in readings]
+    return [one for one, size in zip(readings, sizes, strict=True) if size == min(sizes)] or [
+        np.full(len(days), np.nan)
     ]
-    return [one for one in ways if _parse_moments(some, one).notna().mean() > 0.5] if len(some) else []
-
-
-@cache
-def _date_pattern(way: str) -> re.Pattern[str]:
-    """A regular expression of the texts that may be dates of a way of writing: it is much faster to ask first."""
-    digits = {"Y": r"\d{4}", "b": "[A-Za-z]{3}", "S": r"\d\d?(?:\.\d+)?", "p": "[AaPp][Mm]"}
-    letters = re.escape(way).replace("\\ ", r"\s+")
-    return re.compile(re.sub("%(.)", lambda one: digits.get(one[1], r"\d\d?"), letters))
-
-
-def parse_dates_as(texts: pd.Series[Any], way: str) -> Array:
-    """Dates (N,) of one of the `date_formats` writing as seconds since 1970, NaN for others."""
-    return _since_1970(_parse_moments(texts, way))
-
-
-def _parse_moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
-    """Dates of one way of writing, NaT for others; a second may have a fraction, or none."""
-    moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce").dt.as_unit("us")
-    missing = moments.isna()
-    if "%S" in way and missing.any():
-        again = pd.to_datetime(texts[missing], format=way.replace("%S", "%S.%f"), utc=True, errors="coerce")
-        moments = moments.fillna(again.dt.as_unit("us"))
-    return moments
 
 
 def format_date(moment: float) -> str:
@@ -207,43 +187,30 @@ def _as_texts(cells: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Year, month and day, or year and day of the year (N,), as text; nothing where these are no date."""
-    year, *rest = (pd.Series(part).where(part % 1 == 0).astype("Int64") for part in parts)
-    year = year + (1900 + 100 * (year < 69)).where(year < 100, 0)
-    texts = year.astype("string")
-    for part in rest:
-        texts = texts + "-" + part.astype("string")
-    moments = pd.to_datetime(texts, format="%Y-%m-%d" if len(rest) == 2 else "%Y-%j", errors="coerce")
-    return moments.dt.strftime("%Y-%m-%d").astype(object)
+    """Year, month and day, or year and day of the year (N,), as text for `parse_dates`; none where one is not whole."""
+    year, *rest = parts
+    year = year + np.where(year < 100, 1900 + 100 * (year < 69), 0)
+    rows, digits = zip(year, *rest, strict=True), 5 - len(parts)
+    return _texts_of(("-".join(f"{one:0{digits}.0f}" for one in row) for row in rows), np.all(np.mod(parts, 1) == 0, 0))
 
 
 def time_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Hour, minute and, if there is a third, second (N,), as text for `parse_dates`; nothing where they are no time."""
+    """Hour, minute and, if there is a third, second (N,), as text for `parse_dates`; none where they are no time."""
     hour, minute, second = (*parts, np.zeros(len(parts[0])))[:3]
-    known = (hour % 1 == 0) & (minute % 1 == 0)
+    known = np.all(np.mod([hour, minute], 1) == 0, 0)
     for part, most in ((hour, 24.0), (minute, 60.0), (second, 61.0)):  # with a leap second
         known &= (part >= 0.0) & (part < most)
-    micros = np.where(known, np.round(1e6 * (3600.0 * hour + 60.0 * minute + second)), np.nan)
-    moments = pd.to_datetime(pd.Series(np.minimum(micros, 1e6 * DAY - 1.0)), unit="us")  # 24:00:00 is no time of day
-    return moments.dt.strftime("%H:%M:%S.%f").astype(object)
+    since = np.minimum(np.round(3600.0 * hour + 60.0 * minute + second, 6), DAY - 1e-6)  # 24:00:00 is no time of day
+    return _texts_of((f"{t // 3600:02.0f}:{t // 60 % 60:02.0f}:{t % 60:09.6f}" for t in since), known)
+
+
+def _texts_of(texts: Iterable[str], known: NDArray[np.bool_]) -> pd.Series[Any]:
+    return pd.Series([text if right else None for text, right in zip(texts, known, strict=True)], dtype=object)
 
 
 def _since_1970(moments: pd.Series[Any]) -> Array:
-    since = (moments - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds()
-    return np.array(since, dtype=np.float64)
-
-
-def _since_midnight(times: pd.Series[Any]) -> Array:
-    texts = times.astype("string").str.strip().str.replace(",", ".")
-    half = texts.str[-2:].str.lower()
-    of_twelve = half.isin(["am", "pm"]).to_numpy(dtype=bool, na_value=False)
-    parts = texts.where(~of_twelve, texts.str[:-2]).str.split(":", expand=True)
-    numbers = parts.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
-    since = np.nansum(numbers * [3600.0, 60.0, 1.0][: numbers.shape[1]], axis=1)
-    afternoon = half.eq("pm").to_numpy(dtype=bool, na_value=False)
-    since[of_twelve] = since[of_twelve] % HALF_DAY + HALF_DAY * afternoon[of_twelve]  # 12:30 AM is half past midnight
-    since[np.isnan(numbers[:, 0])] = np.nan
-    return over_midnights(since)
+    dates = pd.to_datetime(moments, format="ISO8601", utc=True, errors="coerce")
+    return np.array((dates - pd.Timestamp("1970-01-01", tz="UTC")).dt.total_seconds(), dtype=np.float64)
 
 
 def over_midnights(since: Array) -> Array:

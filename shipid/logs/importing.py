@@ -150,7 +150,7 @@ def import_log(
     if mapping.parts is not None:
         pieces = [piece for run, part in each for piece in _split_runs(part, run)]
     else:
-        pieces, outside = _cut_segments(mapping, each, logs)
+        pieces, outside = _runs_of_segments(mapping, each, logs)
         repairs += outside
     names = distinct_names(name for name, _ in pieces)
     frames = [_name_run(rows, name) for name, (_, rows) in zip(names, pieces, strict=True)]
@@ -405,10 +405,8 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
         sides = side_letters(name) if column.unit == "deg" and isinstance(column.source, str) else ""
-        place, units = (
-            f"columns.{name}.from",
-            (column.unit, *(["%"] if {"factor", "curve"} & column.model_fields_set else [])),
-        )
+        place, share = f"columns.{name}.from", {"factor", "curve"} & column.model_fields_set
+        units = (column.unit, *(["%"] if share else []))
         parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
         names, coded = source_columns(column.source), column.unit in CODES and (column.unit != "deg" or len(parts) > 1)
         numbers = decode_numbers(parts, names, column.unit, table, other, place) if coded else parts[0]
@@ -488,7 +486,7 @@ def _estimate_velocities(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tu
     return pd.concat(parts, ignore_index=True), records
 
 
-def _cut_segments(
+def _runs_of_segments(
     mapping: Mapping, each: list[tuple[str, ImportedLog]], logs: PlainMapping[str, Path]
 ) -> tuple[list[tuple[str, pd.DataFrame]], Records]:
     """Name and rows of the segments of each log, of a whole log where it has none; rows in none are counted.

@@ -30,12 +30,16 @@ SHORTEST = 1e-4  # s between rows, on average: no recorder of a ship has more th
 
 def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """The time of every row [s]; raises DataError where it is missing or does not rise."""
-    t = read_time_column(log, clock, form, file, path)
-    every, steps = clock.every if isinstance(clock, Clock) else None, np.diff(t)
-    wrong = np.flatnonzero(~(steps > 0) if every is None else steps < 0)
-    wrong = wrong if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
-    if len(wrong):
-        row = int(wrong[0]) + 1
+    return check_times(log, read_time_column(log, clock, form, file, path), clock, file, path)
+
+
+def check_times(log: pd.DataFrame, t: Array, clock: Clock | FileClock, file: Path, path: str) -> Array:
+    """The times (N,) [s] of a log, even ones where they are rounded; raises DataError where one is missing or late."""
+    every, steps = clock.every if isinstance(clock, Clock) else None, np.diff(t, prepend=-np.inf)
+    faults = (~np.isfinite(t), steps < 0, (steps == 0) & (every is None))
+    wrong = next((rows for rows in faults if rows.any()), None)
+    if wrong is not None:
+        row = int(np.argmax(wrong))
         if not np.isfinite(t[row]):
             what = _bad_time(log, clock, row, file, path)
         elif t[row] == t[row - 1]:

@@ -442,6 +442,11 @@ def degrees_to_sides(texts: pd.Series[Any]) -> NDArray[np.float64]:
     return np.asarray(np.where(right, value.where(~port, -value), np.nan), dtype=np.float64)
 
 
+def degrees_to_side(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
+    """Texts (N,) with one of the letters of two sides, as of `SIDES` or `OF_SHIP`, in degrees; NaN for any other."""
+    return degrees_to_sides(texts) if sides == OF_SHIP else degrees_in_text(texts, sides)
+
+
 def is_dated(unit: str) -> bool:
     """Whether a clock in this unit is read as seconds since 1970."""
     return unit == "date" or unit in EPOCHS

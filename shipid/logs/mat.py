@@ -44,14 +44,15 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
         raise DataError(f"no variable of this MATLAB file is a vector of numbers{which}", file=file)
     measure = columns[0] if columns[0] in vectors else _longest_measure(vectors)
     length = len(vectors[measure])
-    for name, values in vectors.items():
-        if len(values) != length:
-            other[name] = f"of {len(values)} values, and {measure!r} has {length}: a column has a value for every time"
-    table = pd.DataFrame({name: values for name, values in vectors.items() if len(values) == length})
-    table.attrs["other"] = other
-    anew = dict.fromkeys(name for name, _, remedy in further if remedy)
-    anew |= dict.fromkeys(name for name in vectors if name not in table)
-    table.attrs["notes"] = [f"{name!r} is {other[name]}" for name in anew]
+    short = {
+        name: f"of {len(values)} values, and {measure!r} has {length}: a column has a value for every time"
+        for name, values in vectors.items()
+        if len(values) != length
+    }
+    table = pd.DataFrame({name: values for name, values in vectors.items() if name not in short})
+    table.attrs["other"] = other | short
+    anew = {name for name, _, remedy in further if remedy} | {*short}
+    table.attrs["notes"] = [f"{name!r} is {what}" for name, what in table.attrs["other"].items() if name in anew]
     return table
 
 
@@ -122,13 +123,12 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
         elif np.iscomplexobj(value):
             yield name, "complex, not a vector of real numbers", f"save real({last})"
         elif np.ndim(value) > 2:
-            shape = " x ".join(map(str, value.shape))
-            yield name, f"an array of {shape}, not a vector or matrix", f"save squeeze({last}), or one part of it"
+            what = f"an array of {' x '.join(map(str, value.shape))}, not a vector or matrix"
+            yield name, what, f"save squeeze({last}), or one part of it"
         elif np.ndim(value) == 0:
             yield name, "a single number, not a vector", ""
         elif np.ndim(value) == 2 and _is_transposed(value):
-            rows, columns = value.shape
-            yield name, f"a matrix of {rows} x {columns}, a row for each signal", f"save {last} = {last}.'"
+            yield name, "a matrix of {} x {}, a row for each signal".format(*value.shape), f"save {last} = {last}.'"
         elif np.ndim(value) == 2:
             yield name, f"a matrix: its columns are {name}.1 to {name}.{value.shape[1]}", ""
 

@@ -200,11 +200,12 @@ def read_nmea(file: Path, form: NmeaFormat, _: object, progress: Callable[[float
             if progress is not None and number % SAID == 0:
                 progress(raw.tell() / size)
             heard.hear(line, number, checked, stamped)
-    times = stamp_times(heard.stamps) if stamped else _fix_times(heard.moments)
+    times = stamp_times([stamp for stamp, _ in heard.instants]) if stamped else _fix_times(heard.instants)
     lost = np.flatnonzero(np.isnan(times))
     if stamped and len(lost):
-        shown = f"no number and no date year-month-day before the sentence ({heard.stamps[lost[0]][:30]!r})"
-        raise DataError(f"{shown}: set [format] time = 'fix'", file=file, path=f"row {heard.numbers[lost[0]]}")
+        stamp, number = heard.instants[lost[0]]
+        shown = f"no number and no date year-month-day before the sentence ({stamp[:30]!r})"
+        raise DataError(f"{shown}: set [format] time = 'fix'", file=file, path=f"row {number}")
     if not heard.said:
         raise DataError(heard.nothing(), file=file, path="format.kind")
     table = _rows_of_times(heard.said, times)
@@ -214,15 +215,13 @@ def read_nmea(file: Path, form: NmeaFormat, _: object, progress: Callable[[float
 
 @dataclass
 class _Heard:
-    """What the lines of a log say: stamps before sentences with the numbers of their lines, or moments of fixes.
+    """What the lines of a log say.
 
-    moments : time of day [s], day, talker of a position, else empty. said : column -> values, their places among the
-    times, their talkers, in the order of the log.
+    instants : of stamped lines stamp and number of the line, else time of day [s], day, talker of a position, else
+    empty, of a fix. said : column -> values, places of their instants, talkers, in the order of the log.
     """
 
-    stamps: list[str] = field(default_factory=list)
-    numbers: list[int] = field(default_factory=list)
-    moments: list[tuple[float, float, str]] = field(default_factory=list)
+    instants: list[tuple[Any, ...]] = field(default_factory=list)
     said: dict[str, list[tuple[float, int, str]]] = field(default_factory=lambda: defaultdict(list))
     unreadable: int = 0
     unread: Counter[str] = field(default_factory=Counter)
@@ -242,13 +241,11 @@ class _Heard:
             self.unreadable += not line.isspace()
             return
         if stamped and values:
-            self.stamps.append(stamp)
-            self.numbers.append(number)
-        elif not math.isnan(time) and (values or sentence.sentence_type == "ZDA"):
-            self.moments.append((time, day, sentence.talker if "latitude" in values else ""))
-        place = len(self.stamps if stamped else self.moments) - 1
-        for name, value in values.items() if place >= 0 else ():  # before the first fix the time is unknown
-            self.said[name].append((value, place, sentence.talker))
+            self.instants.append((stamp, number))
+        elif not stamped and not math.isnan(time) and (values or sentence.sentence_type == "ZDA"):
+            self.instants.append((time, day, sentence.talker if "latitude" in values else ""))
+        for name, value in values.items() if self.instants else ():  # before the first fix the time is unknown
+            self.said[name].append((value, len(self.instants) - 1, sentence.talker))
 
     def notes(self, table: pd.DataFrame) -> Iterator[str]:
         """Yield sentences on what of the log is not in the usual columns."""
@@ -306,7 +303,7 @@ def _time_gap(after: Array, before: Array) -> Array:
     return np.asarray(np.abs((after - before + HALF_DAY) % DAY - HALF_DAY))
 
 
-def _fix_times(moments: list[tuple[float, float, str]]) -> Array:
+def _fix_times(moments: list[tuple[Any, ...]]) -> Array:
     """Times (N,) [s] of fixes since 1970, or since the midnight before the first where none says its day.
 
     One of another talker than most has that of the fix before, or NaN.

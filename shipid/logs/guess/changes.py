@@ -33,7 +33,7 @@ def ask_for_changes(state: State, pause: float) -> None:
     middle = (state.chosen.first + state.chosen.last) // 2
     parts = [(middle >= first) & (middle < end) for first, end in pairwise(edges)]
     changes = [*_other_senses(state, parts, edges)]
-    changes += [*_exchanged(state, parts, middle), *_other_axes(state, parts, middle)] if files else []
+    changes += [*_course_as_heading(state, parts, middle), *_other_axes(state, parts, middle)] if files else []
     for about, words, odd in changes:
         ends = edges[odd[0]], min(edges[odd[-1] + 1], len(state.t) - 1)
         place = f"from {' to '.join(clock_text(state, float(state.t[row])) for row in ends)}"
@@ -44,7 +44,7 @@ def ask_for_changes(state: State, pause: float) -> None:
         state.ask(about, words.replace("{}", place))
 
 
-def _exchanged(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:
+def _course_as_heading(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:
     """Yield where the track of a file keeps to the heading, and in others to the course."""
     psi = next(one for one in state.suggestions if one.name == "psi")
     track, courses = state.chosen.change(state.position), state.all_called("course")

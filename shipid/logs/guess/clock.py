@@ -19,26 +19,24 @@ from shipid.logs.dates import (
     DAY_OF,
     DAY_OF_EXCEL,
     LAST_DATE,
+    MOMENT,
     NEXT_DAY,
     TIME_OF_DAY,
-    date_formats,
-    date_texts,
+    are_in_one_number,
+    day_readings,
     days_with_marks,
     format_date,
-    format_moment,
-    in_one_number,
     join_date_and_time,
     parse_dates,
-    parse_dates_as,
-    rollover_words,
-    time_texts,
 )
+from shipid.logs.formats import Format
 from shipid.logs.guess.words import is_run, name_parts, units_in_name
-from shipid.logs.instants import SHORTEST, clock_rounding, even_clock, rows_repeated
-from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, clock_seconds, since_midnight, source_columns, to_si
+from shipid.logs.instants import check_times, clock_rounding, even_clock, read_time_column, rows_repeated
+from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, Clock, clock_seconds, since_midnight, source_columns, to_si
 
 Rows = NDArray[np.bool_]
 LONG = 1e4  # rows between two runs that have a clock each
+DATES_SHOWN = 20  # rows of a column by which it is taken for dates
 FEWEST_TIMES = 10  # of a second clock that are compared with the first
 APART, OFF = 10, 0.02  # steps of the first clock, and share of its span, by which a second one may go otherwise
 ROWS = 10  # of a day in a column of dates that are numbers, at least
@@ -104,54 +102,7 @@ def _date_fields(columns: dict[str, Array]) -> dict[str, str]:
     return found
 
 
-def _day_columns(fields: dict[str, str]) -> list[str]:
-    """Columns of year, month and day, or of year and day of the year; none where one is not there."""
-    ways = (("year", "month", "day"), ("year", "day of the year"))
-    return next(([fields[one] for one in way] for way in ways if {*way} <= fields.keys()), [])
-
-
-def _in_columns(
-    table: pd.DataFrame, columns: dict[str, Array], dates: str | None
-) -> tuple[dict[str, Any], Array] | None:
-    """The clock of a log with hour, minute and second in columns; `dates` is a column of dates."""
-    fields = _date_fields(columns)
-    times, days = [fields[one] for one in ("hour", "minute", "second") if one in fields], _day_columns(fields)
-    if not {"hour", "minute"} <= fields.keys():
-        return None
-    texts = time_texts([columns[name] for name in times])
-    day: str | list[str] | None = dates or days or None
-    if day is not None:
-        written = column_called(table, day) if isinstance(day, str) else date_texts([columns[name] for name in day])
-        texts = join_date_and_time(written, texts)
-    keys = {"from": times, "unit": "date"} | ({"date": day} if day is not None else {})
-    return _rising_clock(keys, parse_dates(texts))
-
-
-def _in_pair(columns: dict[str, Array]) -> tuple[dict[str, Any], Array] | None:
-    """The clock of a log with whole seconds in one column and the rest of them in another, as ROS and C write it."""
-    for name in columns:
-        begin = re.fullmatch(r"(.*?)_?(?:secs?|seconds?)", name)
-        for other, (unit, rest) in itertools.product(columns, RESTS.items()) if begin else ():
-            letters = {"s + ns": r"n(?:ano)?", "s + us": r"(?:u|micro)"}[unit]
-            if re.fullmatch(rf"{re.escape(begin[1] if begin else '')}_?{letters}secs?(?:onds?)?", other):
-                whole, parts = columns[name], columns[other]
-                t = whole + rest * parts
-                if are_whole(whole, LAST_DATE) and parts.max() * rest < 1.0 and np.all(np.diff(t) > 0):
-                    return {"from": [name, other], "unit": unit}, t
-    return None
-
-
-def _rising_clock(keys: dict[str, Any], t: Array) -> tuple[dict[str, Any], Array] | None:
-    """The clock with these keys and times (N,) [s], at an even rate where it is rounded; None if it does not rise."""
-    if not np.isfinite(t).all():
-        return None
-    if np.all(np.diff(t) > 0):
-        return keys, t
-    rate = _even_rate(t)
-    return None if rate is None else (keys | {"every": rate[0]}, rate[1])
-
-
-def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
+def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array]]:
     """The column that says the run with the number of runs, and the clock, where it begins again with each."""
     for name in filter(is_clock, columns):
         steps = np.diff(columns[name])
@@ -163,127 +114,148 @@ def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict
             if np.all(changed[steps < 0]) and np.mean(changed) < 0.1:
                 length = float(np.ptp(columns[name])) + LONG * float(np.median(steps))
                 return {run: 1 + int(changed.sum())}, {name: columns[name] + np.append(0, np.cumsum(changed)) * length}
-    return {}, None
+    return {}, {}
 
 
 def clock_without_repeats(
-    table: pd.DataFrame, columns: dict[str, Array], file: Path
+    table: pd.DataFrame, columns: dict[str, Array], form: Format, file: Path
 ) -> tuple[dict[str, Any], Array, Rows]:
     """The clock, its times, and which rows it takes: all but a few that repeat the row before."""
     again = rows_repeated(table)
-    if 0 < again.sum() <= REPEATED * len(table):
-        kept = {name: values[~again] for name, values in columns.items()}
-        clock, t = _choose_clock(table.loc[~again].reset_index(drop=True), kept, file)
-        return {**clock, "repeated": "drop"}, t, ~again
+    few = 0 < again.sum() <= REPEATED * len(table)
+    once: Rows = ~again if few else np.ones(len(table), dtype=bool)
     try:
-        return *_choose_clock(table, columns, file), np.ones(len(table), dtype=bool)
+        clock, t = _choose_clock(table, columns, once, form, file)
     except DataError:
         once = _unrepeated_rows(table, columns)
-        if once is None:
+        if few or once.all():
             raise
-        kept = {name: values[once] for name, values in columns.items()}
-        clock, t = _choose_clock(table.loc[once].reset_index(drop=True), kept, file)
+        clock, t = _choose_clock(table, columns, once, form, file)
         if "every" in clock:  # a rounded clock has rows of one time that are not repeated
             raise
-        return {**clock, "repeated": "drop"}, t, once
+    return clock | ({} if once.all() else {"repeated": "drop"}), t, once
 
 
-def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
-    """The rows that do not say the time of the row before once more; None where no clock has a few of these."""
-    for name in map(str, table.columns):
-        if not is_clock(name):
-            continue
-        times = columns[name] if name in columns else parse_dates(column_called(table, name))
-        steps = np.diff(times, prepend=-np.inf)
-        if np.isfinite(times).all() and np.all(steps >= 0) and 0 < np.sum(steps == 0) <= REPEATED * len(table):
+def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows:
+    """The rows that do not say the time of the row before once more; all where no clock has a few of these."""
+    for name in filter(is_clock, map(str, table.columns)):
+        steps = np.diff(_as_numbers(table, columns, name), prepend=-np.inf)
+        if np.isfinite(steps[1:]).all() and np.all(steps >= 0) and 0 < np.sum(steps == 0) <= REPEATED * len(table):
             return np.asarray(steps > 0)
-    return None
+    return np.ones(len(table), dtype=bool)
 
 
-def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
-    """The first clock that rises: of two columns, of texts, of fields, of numbers called so, of any other number."""
-    if (pair := _in_pair(columns)) is not None:
-        return pair
-    rising = [name for name, values in columns.items() if len(values) and np.all(np.diff(values) > 0)]
-    dates, tried = _date_column(table, columns), dict[str, Array]()
-    texts = [name for name in map(str, table.columns) if name not in columns and name]
-    for name in sorted(texts, key=lambda name: not is_clock(name)):
-        column = column_called(table, name)
-        of_day = column.dropna().astype(str).str.fullmatch(TIME_OF_DAY)
-        if len(of_day) and of_day.all() and (clock := _with_date(table, columns, name)):
-            return clock
-        since = parse_dates(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
-        if clock := _rising_clock({"from": name, "unit": "date"}, since):
-            return clock
-        if is_clock(name) or np.isfinite(since).all():
-            tried[name] = since
-    if clock := _in_columns(table, columns, dates):
-        return clock
-    unnamed = list(columns)[:1] if not tried and all(name.isdecimal() for name in columns) else []
-    called = [name for name in columns if is_clock(name)] or unnamed
-    for name in sorted(called, key=lambda name: name not in rising):
-        if np.isfinite(columns[name]).all() and (clock := _of_numbers(table, columns, name, file)):
-            return clock
-    tried |= {name: columns[name] for name in called}
-    tried = {name: t for name, t in tried.items() if name != dates} or tried  # that repeats: the times are at fault
-    faulty = [name for name, t in tried.items() if _nearly_rises(t) or (dates is not None and name in texts)]
-    for name in sorted(rising, key=lambda name: bool(np.all(np.diff(columns[name]) == 1.0))) if not faulty else ():
-        if clock := _of_numbers(table, columns, name, file):  # a counter rises, too
-            return clock
-    fault = "none rises from row to row"
-    for name in [*faulty, *tried][:1]:
-        t = tried[name]
-        t = clock_seconds(t, _unit_of_clock(name, t)) if name in columns and np.isfinite(t).all() else t
-        fault = f"{name!r} {_clock_fault(table, name, t)}"
+def _as_numbers(table: pd.DataFrame, columns: dict[str, Array], name: str) -> Array:
+    """A column (N,) as its numbers, or else as dates [s]; NaN for what is neither."""
+    return columns[name] if name in columns else parse_dates(column_called(table, name))
+
+
+def _choose_clock(
+    table: pd.DataFrame, columns: dict[str, Array], once: Rows, form: Format, file: Path
+) -> tuple[dict[str, Any], Array]:
+    """The first clock that can be imported, with its times; DataError says what is wrong with the surest."""
+    table, columns = table.loc[once], {name: values[once] for name, values in columns.items()}
+    faults: list[tuple[bool, str]] = []
+    for keys in itertools.chain(_clocks_by_name(table, columns), _further_clocks(columns, faults)):
+        try:
+            return _read_clock(table, columns, keys, form, file)
+        except DataError as error:
+            name, place = keys["from"], f" in {error.path}" * ("row" in str(error.path))
+            sure = "date" in keys or not isinstance(name, str) or _nearly_rises(_as_numbers(table, columns, name))
+            faults.append((sure, f"{name!r}{place}: {error.message}"))
+    fault = max(faults, key=lambda one: one[0], default=(False, "none rises from row to row"))[1]
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
-def _of_numbers(
-    table: pd.DataFrame, columns: dict[str, Array], name: str, file: Path
-) -> tuple[dict[str, Any], Array] | None:
-    """The clock of a column of numbers, with dates beside it where it is a time of day; None if it does not rise."""
-    unit, t = _read_clock(table, name, columns[name], file)
-    within_day = unit == "hhmmss" or (columns[name].min() >= 0 and columns[name].max() < 1)
-    if within_day and (with_date := _with_date(table, columns, name)):
-        return with_date
-    rate = _even_rate(t) if np.all(np.diff(t) > 0) and _is_coarse(t) else None
-    keys = {"from": name, "unit": unit}
-    return _rising_clock(keys, t) if rate is None else (keys | {"every": rate[0]}, rate[1])
+def _clocks_by_name(table: pd.DataFrame, columns: dict[str, Array]) -> Iterator[dict[str, Any]]:
+    """Yield keys of clocks, the surest first: of two columns, of texts, of fields, of numbers that are called so."""
+    begins = [(name, re.fullmatch(r"(.*?)_?(?:secs?|seconds?)", name)) for name in columns]
+    for (name, begin), other in itertools.product([one for one in begins if one[1]], columns):  # as ROS and C write it
+        rest = re.fullmatch(rf"{re.escape(begin[1] if begin else '')}_?(n|nano|u|micro)secs?(?:onds?)?", other)
+        unit = "s + ns" if rest and rest[1][0] == "n" else "s + us"
+        if rest and are_whole(columns[name], LAST_DATE) and columns[other].max() * RESTS[unit] < 1.0:
+            yield {"from": [name, other], "unit": unit}
+    fields, dates = _date_fields(columns), _date_column(table, columns)
+    ways = (("year", "month", "day"), ("year", "day of the year"))
+    days = dates or next(([fields[one] for one in way] for way in ways if {*way} <= fields.keys()), None)
+    beside = {"unit": "date"} | ({"date": days} if days else {})
+    texts = [name for name in map(str, table.columns) if name not in columns and name]
+    for name in sorted(texts, key=lambda name: (name == dates, not is_clock(name))):  # a date repeats
+        column = column_called(table, name).dropna()
+        if days and len(column) and column.astype(str).str.fullmatch(TIME_OF_DAY).all():
+            yield {"from": name} | beside
+        if is_clock(name) or (len(column) and np.isfinite(parse_dates(column.head(DATES_SHOWN))).all()):
+            yield {"from": name, "unit": "date"}
+    if {"hour", "minute"} <= fields.keys():
+        yield {"from": [fields[one] for one in ("hour", "minute", "second") if one in fields]} | beside
+    for name in sorted(filter(is_clock, columns), key=lambda name: not np.all(np.diff(columns[name]) > 0)):
+        keys = _number_clock(columns, name)
+        if days and (keys["unit"] == "hhmmss" or (columns[name].min() >= 0 and columns[name].max() < 1)):
+            yield {"from": name} | beside
+        yield keys
+
+
+def _further_clocks(columns: dict[str, Array], faults: list[tuple[bool, str]]) -> Iterator[dict[str, Any]]:
+    """Yield keys of clocks of numbers that are not called so, where no other is at fault; counters rise, too."""
+    rising = [name for name, values in columns.items() if np.all(np.diff(values) > 0)]
+    unnamed = [*columns][:1] if all(name.isdecimal() for name in columns) else []
+    for name in [*unnamed, *sorted(rising, key=lambda name: bool(np.all(np.diff(columns[name]) == 1.0)))]:
+        if not any(sure for sure, _ in faults):
+            yield _number_clock(columns, name)
+
+
+def _number_clock(columns: dict[str, Array], name: str) -> dict[str, Any]:
+    return {"from": name, "unit": _unit_of_clock(name, columns[name][np.isfinite(columns[name])])}
+
+
+def _read_clock(
+    table: pd.DataFrame, columns: dict[str, Array], keys: dict[str, Any], form: Format, file: Path
+) -> tuple[dict[str, Any], Array]:
+    """A clock and its times (N,) [s] as the import reads them, at an even rate where they are rounded."""
+    clock = Clock.model_validate(keys)
+    t = read_time_column(table, clock, form, file, "clock")
+    counted = columns.get(str(clock.source)) if clock.unit != "date" else None
+    if counted is not None and counted.min() > 1e9 and _is_time_of_day(counted % 1e6):
+        raise DataError(f"it is a date and a time of day in one number, {counted[0]:.15g}: write 2024-05-14 08:00:00")
+    if t[0] > LATEST:
+        raise DataError(f"it begins at {t[0]:.12g} s, read in {clock.unit}: write dates, or seconds since 1970")
+    rounded = not np.all(np.diff(t) > 0) or (counted is not None and _is_coarse(t))
+    if rounded and (rate := _even_rate(t)) is not None:
+        return keys | {"every": rate[0]}, rate[1]
+    return keys, check_times(table, t, clock, file, "clock")
 
 
 def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
-    """Yield questions on dates and times of day at t (N,) [s] that may mean another moment."""
+    """Yield questions on dates at t (N,) [s] that may mean another moment."""
     if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
         excel, other = (format_date(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
         yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
-    if clock["unit"] not in ("date", "hhmmss") or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
+    if clock["unit"] != "date" or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
         return
     texts = column_called(table, clock["from"])
     texts = join_date_and_time(column_called(table, clock["date"]), texts) if "date" in clock else texts
-    if pd.api.types.is_string_dtype(texts.dtype):
-        texts = texts.astype(str).str.strip()
-        ways = date_formats(texts)
-        spans = {way: parse_dates_as(texts, way) for way in ways}
-        least = min((since[-1] - since[0] for since in spans.values()), default=0.0)
-        alike = [s for s in spans.values() if np.all(np.diff(s) >= 0) and s[-1] - s[0] == least]  # false where NaN
-        firsts = sorted({format_date(since[0])[:10] for since in alike} - {format_date(t[0])[:10]})
-        if firsts and len(alike) > 1:
-            others = " or ".join(firsts)
-            yield f"{texts.iloc[0]!r} is read as {format_date(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
+    days = texts.astype(str).str.strip().str.extract(MOMENT)[0].dropna()
+    firsts = sorted(
+        {format_date(days[0])[:10] for days in day_readings(days) if np.isfinite(days[:1]).any()}
+        - {format_date(t[0])[:10]}
+    )
+    if firsts:
+        read = f"{texts.iloc[0]!r} is read as {format_date(t[0])[:10]}"
+        yield f"{read}: or is it {' or '.join(firsts)}? Then write 2024-05-14"
 
 
 def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
     """Yield a question for each further clock that goes otherwise than the times t (N,) [s] of the rows."""
     of_rows = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
-    for name in map(str, table.columns):
-        if name in of_rows or not is_clock(name):
+    for name in filter(is_clock, map(str, table.columns)):
+        if name in of_rows:
             continue
-        other = columns[name] if name in columns else parse_dates(column_called(table, name))
+        other = _as_numbers(table, columns, name)
         known = np.isfinite(other)
-        values, times = other[known], t[known]
-        if len(values) < FEWEST_TIMES or not np.all(np.diff(values) > 0):
+        since, times = other[known], t[known]
+        if len(since) < FEWEST_TIMES or not np.all(np.diff(since) > 0):
             continue
-        since = clock_seconds(values, _unit_of_clock(name, values)) if name in columns else values
+        since = clock_seconds(since, _unit_of_clock(name, since)) if name in columns else since
         off = float(np.ptp(since - times))
         if off > max(APART * float(np.median(np.diff(t))), OFF * float(times[-1] - times[0])):
             how = f"{name!r} is a clock, too, and goes otherwise than that of the rows: they part by {off:.3g} s"
@@ -306,46 +278,16 @@ def _date_column(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
     return None
 
 
-def _with_date(table: pd.DataFrame, columns: dict[str, Array], name: str) -> tuple[dict[str, Any], Array] | None:
-    """The clock of a column of times of day beside dates; None where there are none, or it does not rise."""
-    day = _date_column(table, columns) or _day_columns(_date_fields(columns))
-    if not day:
-        return None
-    of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
-    t = parse_dates(join_date_and_time(of_date, column_called(table, name)))
-    return _rising_clock({"from": name, "unit": "date", "date": day}, t)
-
-
 def is_clock(name: str) -> bool:
     """Whether a column has the name of a clock."""
     parts = set(name_parts(name)) | {name_without_unit(name)}
     return bool(parts & CLOCK_WORDS) and not parts & NO_CLOCK_WORDS
 
 
-def _looks_dated(column: pd.Series[Any]) -> bool:
-    texts = column.dropna().astype(str).head(20)
-    dated = texts.str.fullmatch(rf"{TIME_OF_DAY}|\d{{4}}-\d\d-\d\d[T ].*|(?:{DAY_OF}),? .*")
-    return bool(len(texts) and dated.all())
-
-
-def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tuple[str, Array]:
-    """The unit of a clock of numbers, and its times [s]."""
-    if in_one_number(values):
-        return "date", parse_dates(column_called(table, name))
-    if values.min() > 1e9 and _is_time_of_day(values % 1e6):
-        message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
-        raise DataError(f"no column can be the clock: {message}", file=file)
-    unit = _unit_of_clock(name, values)
-    t = clock_seconds(values, unit)
-    step = float(np.ptp(t)) / max(1, len(t) - 1)
-    if 0.0 < step < SHORTEST or t[0] > LATEST:
-        message = f"{name!r}, read in {unit}, begins at {t[0]:.12g} s, with rows {step:.3g} s apart"
-        raise DataError(f"no column can be the clock: {message}: write dates, or seconds since 1970", file=file)
-    return unit, t
-
-
 def _unit_of_clock(name: str, values: Array) -> str:
     """The unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
+    if are_in_one_number(values):
+        return "date"
     again = _wrapping_clock_unit(values)
     if again is not None and not _is_time_of_day(values):
         return again
@@ -407,7 +349,7 @@ def _is_coarse(t: Array) -> bool:
 
 def _even_rate(t: Array) -> tuple[float, Array] | None:
     """The step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
-    if len(t) < 20 or np.any(np.diff(t) < 0) or len(np.unique(t)) < 10:
+    if len(t) < 20 or not np.all(np.diff(t) >= 0) or len(np.unique(t)) < 10:
         return None
     _values, first = np.unique(t, return_index=True)
     early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
@@ -449,25 +391,6 @@ def _nearly_rises(values: Array) -> bool:
     """Whether a column (N,) rises but for a few rows that are lost or go back, as a clock with a fault does."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps) > FEWEST * len(values) and np.mean(steps > 0) > NEARLY)
-
-
-def _clock_fault(table: pd.DataFrame, name: str, values: Array) -> str:
-    """What is wrong with a clock (N,): its first text that is no time, or where it goes back or repeats."""
-    wrong = ~np.isfinite(values)
-    if wrong.any():
-        texts = column_called(table, name).astype(str).str.strip()
-        of_day = texts.str.fullmatch(TIME_OF_DAY).to_numpy(dtype=bool)
-        wrong = ~of_day if wrong.all() and of_day.mean() > 0.5 else wrong  # a single other text, and none is read
-        row = int(np.argmax(wrong))
-        count = f" or in {wrong.sum() - 1} rows like it" * bool(wrong.sum() > 1)
-        remedy = "remove them, or write all times in one way, as 2024-05-14 08:00:00"
-        return f"holds {texts.iloc[row][:40]!r} in row {row + 1}, no number or time that can be read{count}: {remedy}"
-    row = int(np.argmax(np.diff(values) < 0)) + 1
-    if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
-        before, after = format_moment(values[row - 1]), format_moment(values[row])
-        back = f"goes back from {before} to {after}{rollover_words(values[row] - values[row - 1])} in row {row + 1}"
-        return f"{back}: sort the log, or split it there, and join the parts; if it is local time, write UTC"
-    return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
 
 
 def name_without_unit(name: str) -> str:

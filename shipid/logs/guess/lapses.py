@@ -88,7 +88,7 @@ def take_fills(state: State) -> None:
             state.spikes[name] = np.union1d(np.flatnonzero(rows), before), min(least, float(size.min()))
 
 
-def report_lapses_of_commands(state: State, sniffed: LogTable) -> None:
+def report_command_faults(state: State, sniffed: LogTable) -> None:
     """Report zeros, spikes and still stretches of commands, as they are in the log."""
     for one in (one for one in state.suggestions if is_command(one.name)):
         raw = sniffed.columns[one.source]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import itertools
 import re
 from collections import Counter
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from shipid.logs.foreign import foreign_format
 from shipid.logs.formats import LOOKED_AT, SheetFormat
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.words import NO_VALUE, known_words, meaning_scores
+from shipid.logs.importing import distinct_names
 from shipid.logs.mapping import is_position
 from shipid.logs.nmea import is_nmea
 from shipid.logs.readers import READERS, grouped_number, refuse_power_cut
@@ -32,10 +35,7 @@ GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
 MOST_HEADS = 3  # lines above the data: names in two, and units
 WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
-STATISTICS = re.compile(
-    r"(min|max)(imum|\.)?|mean|avg|average|median|std(ev)?|sd|rms|mittel(wert)?|sum|count", re.IGNORECASE
-)
-"""First cell of a line of numbers between the names and the data that sums up the log."""
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 _UNIT = re.compile(
     r"[\[(]?(s|secs?|seconds|ms|us|ns|mins?|minutes|h|hrs?|hours?|d|days?|m|mm|cm|km|meters?|metres?|ft|deg(rees)?|°|grad|rad|m/s|mps|m\*s-1|kn|kts?|knots?|km/h|kmh|mph|cm/s|mm/s|"
@@ -88,7 +88,10 @@ def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any],
 def _has_clock(lines: str) -> bool:
     first = lines.split("\n", LOOKED_AT)[:LOOKED_AT]
     return any(
-        is_clock(cell) for line in first for cell in split_cells(line, SEPARATOR) if cell and not _is_number(cell)
+        is_clock(cell)
+        for line in first
+        for cell in split_cells(line, SEPARATOR)
+        if cell and not _NUMBER.fullmatch(cell)
     )
 
 
@@ -101,19 +104,20 @@ def _guess_encoding(head: bytes, file: Path) -> str:
     if b"\0" in head:
         refuse_power_cut(head, file)
         raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
-    begin = head[:-4] if len(head) > 4 else head  # the last character may be cut
     utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"
-    with suppress(UnicodeDecodeError):
-        begin.decode(utf8)
+    if _is_encoded(head, utf8):
         return utf8
-    words = {one: known_words(begin.decode(one, "ignore")) for one in ELSEWHERE}
+    words = {one: known_words(head.decode(one, "ignore")) for one in ELSEWHERE}
     best = max(ELSEWHERE, key=lambda one: words[one])
-    if words[best] > 1:
-        return best
+    return best if words[best] > 1 else "cp1252" if _is_encoded(head, "cp1252") else "latin-1"
+
+
+def _is_encoded(head: bytes, encoding: str) -> bool:
+    """Whether the first bytes of a text are of an encoding; the last character may be cut."""
     with suppress(UnicodeDecodeError):
-        begin.decode("cp1252")
-        return "cp1252"
-    return "latin-1"
+        codecs.getincrementaldecoder(encoding)().decode(head)
+        return True
+    return False
 
 
 def _text_format(
@@ -139,28 +143,24 @@ def _text_format(
     form |= {"thousands": mark} if mark is not None else {}
     if names:
         return form | {"skip_rows": data, "names": list(names)}
-    return form | _header_keys(lines, rows, shares, data, width, separator)
+    return form | _header_keys(lines, rows, data, width, separator)
 
 
-def _header_keys(
-    lines: list[str], rows: list[list[str]], shares: list[float], data: int, width: int, separator: str
-) -> dict[str, Any]:
+def _header_keys(lines: list[str], rows: list[list[str]], data: int, width: int, separator: str) -> dict[str, Any]:
     """The keys of [format] that say the names of the columns, by the lines above that at which the data begin."""
     dated = _date_and_time(rows[data]) if separator == "whitespace" else None
-    sums = [i for i in range(data) if shares[i] > 0.0 and STATISTICS.fullmatch(rows[i][0])]
-    above = [i for i in range(data - 1, -1, -1) if any(rows[i]) and i not in sums][:MOST_HEADS]
+    above = [i for i in range(data - 1, -1, -1) if any(rows[i])][:MOST_HEADS]
     heads = {i: cells for i in above if (cells := _fit_header(lines[i], rows[i], width, separator, dated))}
     called, first = _header_above([*heads.values()]), next(iter(heads), None)
     if not called and first is not None and first == above[0]:
-        if heads[first] == [*rows[first], ""][:width] and not (sums and sums[-1] > first):
+        if heads[first] == [*rows[first], ""][:width]:
             return {"skip_rows": first}
         called = heads[first]
     if called:
-        return {"skip_rows": data, "names": _distinct_columns(called)}
-    longer = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
-    if longer and not heads:  # a table beside the log ends above this line
-        beside = [""] * (max(len(row) for row in rows[longer[-1] + 1 :]) - width)
-        return {"skip_rows": longer[-1] + 1, "names": [*_distinct_columns(rows[longer[-1]][:width]), *beside]}
+        return {
+            "skip_rows": data,
+            "names": distinct_names(name or f"column {place}" for place, name in enumerate(called, start=1)),
+        }
     return {"skip_rows": data, "header": False}
 
 
@@ -220,7 +220,8 @@ def _header_above(heads: list[list[str]]) -> list[str]:
         best = [both if name in twice else name for name, both in zip(best, ways[2], strict=True)] if twice else best
     if best is heads[0] and units is None:
         return []
-    named = [_with_unit(*pair) for pair in zip(best, units or [""] * len(best), strict=True)]
+    pairs = zip(best, units or [""] * len(best), strict=True)
+    named = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in pairs]
     while named and not named[-1]:
         named.pop()
     return named
@@ -234,26 +235,11 @@ def _header_meaning(names: list[str]) -> float:
     )
 
 
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit.strip('[]()')}]" if unit else name
-
-
 def _date_and_time(row: list[str]) -> int | None:
     pairs = enumerate(itertools.pairwise(row))
     return next(
         (k for k, (one, other) in pairs if re.fullmatch(DAY_OF, one) and re.fullmatch(TIME_OF_DAY, other)), None
     )
-
-
-def _distinct_columns(names: list[str]) -> list[str]:
-    """The names with a number added to those that are there already or empty."""
-    result: list[str] = []
-    for index, name in enumerate(names):
-        known = name or f"column {index + 1}"
-        while known in result:
-            known += " (2)"
-        result.append(known)
-    return result
 
 
 def _is_units(row: list[str]) -> bool:
@@ -267,9 +253,8 @@ def split_cells(line: str, separator: str) -> list[str]:
     if separator == "whitespace":
         return line.split()
     row = line.split(separator)
-    if '"' in line:
-        with suppress(csv.Error):  # a line with a NUL
-            row = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    with suppress(csv.Error):  # a cell that is too long
+        row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), row)
     return [cell.strip().strip('"') for cell in row]
 
 
@@ -289,26 +274,14 @@ def _thousands_mark(rows: list[list[str]], decimal: str) -> str | None:
 
 def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | None) -> list[int]:
     """Places of a line's cells that hold numbers in most lines where they hold anything; all where none do."""
-    found = []
-    for place in range(len(rows[0])):
-        column = [row[place] for row in rows]
-        if _number_share(column, decimal, thousands) > 0.5:
-            found.append(place)
-    return found or [*range(len(rows[0]))]
+    columns = enumerate(zip(*rows, strict=True))
+    return [place for place, one in columns if _number_share(one, decimal, thousands) > 0.5] or [*range(len(rows[0]))]
 
 
-def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
+def _number_share(row: Iterable[str], decimal: str, thousands: str | None = None) -> float:
     cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
     grouped = re.compile(grouped_number(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
     cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
-    known = [_is_number(cell) or is_amount(cell) or is_position(cell) for cell in cells]
+    known = [bool(_NUMBER.fullmatch(cell)) or is_amount(cell) or is_position(cell) for cell in cells]
     return sum(known) / len(known) if known else 0.0
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True

@@ -15,7 +15,7 @@ import pandas as pd
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, split_amounts
-from shipid.logs.cells import OFF_ONE
+from shipid.logs.cells import OFF_ONE, text_numbers
 from shipid.logs.formats import LOOKED_AT, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
@@ -30,10 +30,10 @@ from shipid.logs.guess.clock import (
 from shipid.logs.guess.layout import format_of_sheet, guess_format
 from shipid.logs.guess.words import NO_VALUE, is_run, meaning_scores, name_parts, units_in_name
 from shipid.logs.mapping import (
+    OF_SHIP,
     SIDES,
     degrees_in_parts,
-    degrees_in_text,
-    degrees_to_sides,
+    degrees_to_side,
     quaternion_size,
     quaternion_yaw,
     source_columns,
@@ -143,10 +143,8 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         ragged = table.attrs["ragged"]
         if ragged and not sampled:
             form["ragged"] = "drop"
-            count = "1 line repeats" if len(ragged) == 1 else f"{len(ragged)} lines repeat"
-            have = "has" if len(ragged) == 1 else "have"
-            first = f"{count} the header or {have} another number of cells, the first is line {ragged[0]}"
-            notes = (*notes, f"{first}: left out")
+            left_out = "lines that repeat the header or have another number of cells are left out"
+            notes += (f"{left_out}: {len(ragged)}, the first is line {ragged[0]}",)
         if len(table) < 2:
             raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     else:
@@ -157,66 +155,53 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     other: dict[str, str] = table.attrs.get("other", {})
     _refuse_ships(table, file)
     table, in_units, mixed = _without_units(table)
-    columns, words = _number_columns(table, form.get("decimal", "."), form.get("thousands"))
-    in_parts = _degree_columns(columns)
-    turned = _quaternion_columns(columns)
+    decimal = form.get("decimal", ".")
+    columns, words = _number_columns(table, decimal, form.get("thousands"))
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
-    in_text, letters = _in_text(table, [*words, *rarely], form.get("decimal", "."))
-    columns |= dict(in_text.values()) | _to_sides(table, [*words, *rarely], form.get("decimal", "."))
+    in_text, letters = _in_text(table, [*words, *rarely], decimal)
+    columns |= dict(in_text.values())
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
         missing = [*_words_for_nothing(table, columns, model), *_missing_value_texts(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
+            model = model.model_copy(update={"missing": tuple(form["missing"])})
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
-    made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
-    made |= {name: quaternion_yaw([columns[part] for part in parts]) for name, parts in turned.items()}
-    made |= {name: values for name, (source, values) in in_text.items() if name != source}
-    in_parts |= turned | in_units
-    in_parts |= {name: (in_text[name][0],) for name in made.keys() & in_text.keys()}
+    made = _degree_columns(columns) | _quaternion_columns(columns)
+    made |= {name: ((source,), values) for name, (source, values) in in_text.items() if name != source}
+    in_parts = {name: parts for name, (parts, _) in made.items()} | in_units
     words = [name for name in words if name not in columns]
+    lost = next(filter(is_clock, other), None)
+    if lost is not None and not any(map(is_clock, map(str, table.columns))):
+        raise DataError(f"no column can be the clock: {lost!r} is {other[lost]}", file=file)
     runs, since = clock_restarts(table, columns)
-    try:
-        clock, t, once = clock_without_repeats(table, columns if since is None else columns | since, file)
-    except DataError:
-        lost = next(filter(is_clock, other), None)
-        if lost is not None and not any(map(is_clock, columns)):
-            raise DataError(f"no column can be the clock: {lost!r} is {other[lost]}", file=file) from None
-        raise
-    columns = {name: values[once] for name, values in (columns | made).items()}
+    clock, t, once = clock_without_repeats(table.assign(**since), columns | since, model, file)
+    columns = {name: values[once] for name, values in columns.items()}
+    columns |= {name: values[once] for name, (_, values) in made.items()}
     named = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
     named |= {part for parts in in_parts.values() for part in parts}
-    texts = {name: column_called(table, name).dropna().astype(str).str.strip() for name in words}
-    says = {name: next(filter(None, column), "") for name, column in texts.items()}
+    says = {name: next(filter(None, column_called(table, name).dropna().astype(str).str.strip()), "") for name in words}
     notes += tuple(
         f"column {name!r} holds words, not numbers{_as_number(name, says[name])}"
         for name in words
         if name and name not in {*named, *mixed}
     )
     notes += tuple(f"column {name!r} has numbers in {units}: write one unit" for name, units in mixed.items())
-    constant = [name for name, values in columns.items() if np.isnan(values).all()]
-    kept = {name: values for name, values in columns.items() if name not in {*named, *constant}}
-    empty = tuple(f"column {name!r} is empty" for name in constant if name)
-    form.pop("ragged", None) if form.get("ragged") == "refuse" else None
-    if not once.all():
-        notes += ("rows that repeat the row before are left out",)
-    kept = {name: values for name, values in kept.items() if name not in runs}
-    seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
-    doubts = tuple(doubts_on(table.loc[once], clock, t))
-    doubts += tuple(_minus_ones(columns))
-    doubts += () if runs else tuple(other_clocks(table.loc[once], columns, clock, t))
+    notes += () if once.all() else ("rows that repeat the row before are left out",)
+    empty = [name for name, values in columns.items() if np.isnan(values).all()]
+    doubts = (*doubts_on(table.loc[once], clock, t), *_minus_ones(columns))
     return LogTable(
         form,
         clock,
         t,
-        kept,
-        notes + empty,
-        seams,
+        {name: values for name, values in columns.items() if name not in {*named, *empty, *runs}},
+        notes + tuple(f"column {name!r} is empty" for name in empty if name),
+        BLOCKS if sampled else sum(runs.values()) - len(runs),
         runs,
         letters | _side_columns(table, words),
         says,
         other,
-        doubts,
+        doubts if runs else (*doubts, *other_clocks(table.loc[once], columns, clock, t)),
         in_parts,
     )
 
@@ -258,10 +243,11 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
     if _says_ship(name) and (_are_measured(ships) or len(texts) < ROWS_EACH * len(ships)):
         return
     if len(ships) > 1:
-        first = ", ".join(ships[:3])
-        message = f"holds {len(ships)} ships ({name!r} is {first}{', ...' if len(ships) > 3 else ''})"
-        remedy = "write the rows of each ship to a separate log, or take the column out of the log if it is one ship"
-        raise DataError(f"{message}: {remedy}", file=file)
+        raise DataError(
+            f"holds {len(ships)} ships ({name!r} is {', '.join(ships[:3])}{', ...' * (len(ships) > 3)}): write the "
+            "rows of each ship to a separate log, or take the column out of the log if it is one ship",
+            file=file,
+        )
 
 
 def _says_ship(name: str) -> bool:
@@ -315,10 +301,12 @@ def _number_columns(table: pd.DataFrame, decimal: str, thousands: str | None) ->
         if pd.api.types.is_bool_dtype(column.dtype):
             words.append(name)
             continue
-        if not pd.api.types.is_numeric_dtype(column.dtype):
-            text = in_points(column.astype(str).str.strip(), decimal, thousands)
-            column = pd.to_numeric(text, errors="coerce")
-        values = column.to_numpy(dtype=np.float64, na_value=np.nan).copy()
+        numeric = pd.api.types.is_numeric_dtype(column.dtype)
+        values = (
+            column.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
+            if numeric
+            else text_numbers(column.astype(str).str.strip(), decimal, thousands)
+        )
         values[np.isinf(values)] = np.nan
         if np.isnan(values).any() and is_run(name):  # names of runs, as numbers
             values = pd.factorize(table.iloc[:, index].ffill().bfill())[0].astype(np.float64)
@@ -332,33 +320,38 @@ def _number_columns(table: pd.DataFrame, decimal: str, thousands: str | None) ->
     return columns, words
 
 
-def _degree_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
+Made = dict[str, tuple[tuple[str, ...], Array]]
+"""Name of a column that is made of others -> these, and its values (N,)."""
+
+
+def _degree_columns(columns: dict[str, Array]) -> Made:
     """Latitudes and longitudes in columns of whole degrees, minutes and perhaps seconds, by the names of all."""
-    found: dict[str, tuple[str, ...]] = {}
-    names = list(columns)
-    for place, name in enumerate(names[:-1]):
-        meant = next((one for one in ("latitude", "longitude") if meaning_scores(name).get(one, 0.0) > 0.5), None)
-        if meant is None or any(name in parts for parts in found.values()) or not are_whole(columns[name], 180.0):
-            continue
-        parts = [name]
-        for other in names[place + 1 : place + 3]:
-            last = name_parts(other)[-1:] + tuple(units_in_name(other))
-            of_angle = meant in meaning_scores(other) or bool(MINUTES & {*last})
-            if not of_angle or (meant != "longitude" and "longitude" in meaning_scores(other)):
-                break
-            if not np.nanmax(np.abs(columns[other]), initial=0.0) < 60.0:
-                break
-            parts.append(other)
-            if not are_whole(columns[other], 60.0):
-                break
-        if len(parts) > 1 and not are_whole(columns[parts[-1]], 60.0):
-            found[" + ".join(parts)] = tuple(parts)
+    found, names = Made(), tuple(columns)
+    for place, count in itertools.product(range(len(names)), (3, 2)):
+        parts = names[place : place + count]
+        meant = next((one for one in ("latitude", "longitude") if meaning_scores(parts[0]).get(one, 0.0) > 0.5), None)
+        used = {part for others, _ in found.values() for part in others}
+        if meant and len(parts) == count and not used & {*parts} and _are_parts_of_angle(columns, parts, meant):
+            found[" + ".join(parts)] = parts, degrees_in_parts([columns[part] for part in parts])
     return found
 
 
-def _quaternion_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
-    """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these alone, and its size is 1."""
-    found: dict[str, tuple[str, ...]] = {}
+def _are_parts_of_angle(columns: dict[str, Array], parts: tuple[str, ...], meant: str) -> bool:
+    """Whether columns are degrees, and minutes and perhaps seconds below 60, the last of which alone is not whole."""
+    _, *others = ([name, *name_parts(name)[-1:], *units_in_name(name)] for name in parts)
+    called = all(
+        (meant in meaning_scores(name) or MINUTES & {*words})
+        and (meant == "longitude" or "longitude" not in meaning_scores(name))
+        for name, *words in others
+    )
+    small = all(np.nanmax(np.abs(columns[name]), initial=0.0) < 60.0 for name, *_ in others)
+    whole = [are_whole(columns[name], 180.0) for name in parts]
+    return called and small and all(whole[:-1]) and not whole[-1]
+
+
+def _quaternion_columns(columns: dict[str, Array]) -> Made:
+    """Yaw angles of columns x, y, z, w of a quaternion: names that differ by these alone, and its size is 1."""
+    found: Made = {}
     for name, letters in itertools.product(columns, QUATERNIONS):
         place = name.rfind(letters[3])
         four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in letters)
@@ -366,43 +359,34 @@ def _quaternion_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]
             size = quaternion_size([columns[one] for one in four])
             known = np.isfinite(size) & (size > 0)
             if known.any() and np.all(np.abs(size[known] - 1.0) < OFF_ONE):
-                found[f"{name[:place].rstrip('._/ [(')} yaw".strip()] = four
+                yaw = quaternion_yaw([columns[one] for one in four])
+                found[f"{name[:place].rstrip('._/ [(')} yaw".strip()] = four, yaw
     return found
 
 
 def _in_text(
     table: pd.DataFrame, names: list[str], decimal: str
 ) -> tuple[dict[str, tuple[str, Array]], frozenset[str]]:
-    """Name -> column of text and degrees (N,) of each latitude and longitude in it, and the letters of their sides.
+    """Name -> column of text and degrees (N,) of each latitude, longitude and angle to a side of the ship in it.
 
-    A column that holds both is called `Position latitude` and `Position longitude`.
+    Also the letters of the sides of the Earth. A column that holds a latitude and a longitude is called
+    `Position latitude` and `Position longitude`.
     """
     found: dict[str, tuple[str, Array]] = {}
     letters: set[str] = set()
     for name in filter(None, names):
         texts = in_points(column_called(table, name).astype(str).str.strip(), decimal, None)
-        meant = [one for one in SIDES if meaning_scores(name).get(one, 0.0) > 0.5]
-        read = {one: degrees_in_text(texts, SIDES[one]) for one in meant or SIDES}
-        known = {one: values for one, values in read.items() if np.mean(np.isfinite(values)) > 0.5}
+        sure = [one for one, score in meaning_scores(name).items() if score > 0.5]
+        meant = [one for one in SIDES if one in sure] or [one for one in sure if one in ("delta", "alpha", "phi")]
+        read = {one: degrees_to_side(texts, SIDES.get(one, OF_SHIP)) for one in meant or SIDES}
         # a time of day may be both: then they are equal
-        lettered = meant or np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) > 0
-        if len(known) != len(read) or not lettered:
+        alike = not meant and np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) == 0
+        if alike or any(np.mean(np.isfinite(values)) <= 0.5 for values in read.values()):
             continue
-        found |= {name if meant else f"{name} {one}": (name, values) for one, values in known.items()}
-        for one in known:
-            letters |= {letter for letter in SIDES[one] if texts.str.contains(letter, case=False).any()}
+        found |= {name if meant else f"{name} {one}": (name, values) for one, values in read.items()}
+        held = [letter for one in read for letter in SIDES.get(one, "")]
+        letters |= {letter for letter in held if texts.str.contains(letter, case=False).any()}
     return found, frozenset(letters)
-
-
-def _to_sides(table: pd.DataFrame, names: list[str], decimal: str) -> dict[str, Array]:
-    """Name -> degrees (N,) of each column of angles to the sides of the ship, such as P12.5; those to starboard > 0."""
-    found = {}
-    for name in names:
-        if max(meaning_scores(name).get(one, 0.0) for one in ("delta", "alpha", "phi")) > 0.5:
-            angles = degrees_to_sides(in_points(column_called(table, name).astype(str).str.strip(), decimal, None))
-            if np.mean(np.isfinite(angles)) > 0.5:
-                found[name] = angles
-    return found
 
 
 def _side_columns(table: pd.DataFrame, words: list[str]) -> frozenset[str]:

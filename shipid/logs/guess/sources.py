@@ -54,28 +54,25 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
         return GuessFiles(path, None, {path.stem: path}, {}, {}, parts, held, log)
     sniffed: dict[Path, LogTable] = {}
     skipped: dict[str, str] = {}
+    taken = ""
     for pattern in patterns:  # a folder of one log and a readme has two endings: that of the log is taken
-        for file in sorted(file for file in folder.glob(pattern) if file.is_file()):
+        for file in sorted(filter(Path.is_file, folder.glob(pattern))):
             try:
+                if taken:
+                    raise DataError(f"the logs are files {taken!r}")
                 sniffed[file] = recognise_log(file, names)
             except ShipidError as error:
                 skipped[file.relative_to(folder).as_posix()] = error.message
-        if sniffed:
-            break
-    others = patterns[patterns.index(pattern) + 1 :] if sniffed else []
-    for file in sorted(file for other in others for file in folder.glob(other) if file.is_file()):
-        skipped[file.relative_to(folder).as_posix()] = f"the logs are files {pattern!r}"
-    if not sniffed and not skipped:
-        raise DataError(f"cannot be read: no file {pattern!r} with a log in this folder", file=folder)
+        taken = taken or pattern * bool(sniffed)
     if not sniffed:
-        first = next(iter(skipped))
+        first, why = next(iter(skipped.items()), ("no file", f"none is called {patterns[-1]!r}"))
         more = f"; so are {len(skipped) - 1} others" if len(skipped) > 1 else ""
-        raise DataError(f"no file can be read: {first}: {skipped[first]}{more}", file=folder)
+        raise DataError(f"no file of this folder can be read: {first}: {why}{more}", file=folder)
     kept = _files_alike(sniffed, folder, skipped)
-    runs = {run_name(file, folder, pattern): file for file in kept}
+    runs = {run_name(file, folder, taken): file for file in kept}
     kinds = {run: kind for run, file in runs.items() if (kind := kind_in_name(file.stem))}
     parts, held = _parts_of_runs(kept, by_pause=True)
-    return GuessFiles(folder, pattern, runs, skipped, kinds, parts, held, _join_files(list(kept.values())))
+    return GuessFiles(folder, taken, runs, skipped, kinds, parts, held, _join_files(list(kept.values())))
 
 
 def _parts_of_runs(logs: dict[Path, LogTable], *, by_pause: bool) -> tuple[dict[str, Any], int]:
@@ -118,20 +115,20 @@ def _file_patterns(path: Path) -> tuple[Path, list[str]]:
     """Folder and patterns of a folder or glob, that of most files first; a file has no pattern."""
     text = path.as_posix()
     if "*" in text and not path.exists():
-        before = text[: text.index("*")]
-        folder, slash, _ = before.rpartition("/")
+        folder, slash, _ = text[: text.index("*")].rpartition("/")
         return Path(folder or ("/" if slash else ".")), [text[len(folder) + len(slash) :]]
     if not path.is_dir():
         return path, []
-    files: dict[str, list[Path]] = {}
-    for file in path.rglob("*"):
-        if file.is_file() and file.suffix.lower() in ENDINGS:
-            files.setdefault(file.suffix, []).append(file)
-    if not files:
+    logs = [file for file in path.rglob("*") if file.is_file() and file.suffix.lower() in ENDINGS]
+    if not logs:
         raise DataError(f"cannot be read: a folder without a log ({', '.join(ENDINGS)})", file=path)
+    endings = dict.fromkeys(file.suffix for file in logs)
+    files = {ending: [file for file in logs if file.suffix == ending] for ending in endings}
     size = {ending: (len(some), sum(file.stat().st_size for file in some)) for ending, some in files.items()}
     deep = {ending: "" if all(file.parent == path for file in some) else "**/" for ending, some in files.items()}
-    return path, [f"{deep[ending]}*{ending}" for ending in sorted(files, key=lambda ending: size[ending], reverse=True)]
+    return path, [
+        f"{deep[ending]}*{ending}" for ending in sorted(endings, key=lambda ending: size[ending], reverse=True)
+    ]
 
 
 def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str, str]) -> dict[Path, LogTable]:
@@ -148,14 +145,11 @@ def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str,
     names = {name for name, count in wanted.items() if count > len(kept) / 2}
     for file, log in sniffed.items():
         lacking = sorted(names - set(log.columns))
-        if file not in kept:
-            reason = "written otherwise than the others (separator, decimal sign, encoding, header or clock)"
-        elif lacking:
+        if lacking or file not in kept:
             reason = f"lacks {', '.join(map(repr, lacking[:3]))}, which the others have"
-            kept.pop(file)
-        else:
-            continue
-        skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone, then `shipid data join`"
+            if kept.pop(file, None) is None:
+                reason = "written otherwise than the others (separator, decimal sign, encoding, header or clock)"
+            skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone, then `shipid data join`"
     if not kept:
         raise DataError("no two files have the same columns: guess them one by one", file=folder)
     return kept

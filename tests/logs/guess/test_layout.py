@@ -103,6 +103,15 @@ def test_encodings_of_other_scripts(names: tuple[str, ...], encoding: str, tmp_p
     )
 
 
+@pytest.mark.parametrize("last", ["°C", "°", "C°C "])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_an_encoding_does_not_depend_on_the_last_letters(last: str, end: str, tmp_path: Path) -> None:
+    """Four bytes were cut off, perhaps in a letter of two: a log in utf-8 that ends so was taken for cp1252."""
+    lines = text(table=TABLE.assign(unit=last)).splitlines()
+    (tmp_path / "log.csv").write_bytes((end.join(lines) + end).encode())
+    assert recognise_log(tmp_path / "log.csv").form["encoding"] == "utf-8"
+
+
 def test_a_separator_between_quotes_is_part_of_a_name(tmp_path: Path) -> None:
     """Such a header was taken for no header, and columns were called by their numbers."""
     names = ["time", "Rudder angle [deg, + port]", "x, y", "n"]
@@ -149,7 +158,7 @@ def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> Non
     sniffed = recognise_log(file)
     assert sniffed.form["ragged"] == "drop"
     assert sniffed.notes == (
-        "2 lines repeat the header or have another number of cells, the first is line 21: left out",
+        "lines that repeat the header or have another number of cells are left out: 2, the first is line 21",
     )
     np.testing.assert_array_equal(sniffed.t, np.arange(60.0))
     with pytest.raises(DataError, match="repeats the header: remove the line") as caught:

@@ -42,18 +42,21 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
         (b"", "the file is empty"),
         (b"\x00\x01\x02 binary", "a binary file of unknown format"),
         (b"a letter\nto the captain\nwith no numbers\n", "no table of numbers with any separator"),
-        (text(table=TABLE.assign(time=np.minimum(T, 8.0), N=1.0, psi=1.0)).encode(), "'time' repeats in row 18"),
+        (
+            text(table=TABLE.assign(time=np.minimum(T, 8.0), N=1.0, psi=1.0)).encode(),
+            "'time' in row 18: the time 8 s appears twice",
+        ),
         (
             text(table=TABLE.assign(time=np.abs(T - 2.0), N=1.0, psi=1.0)).encode(),
-            "'time' goes back from 2 s to 1.5 s in row 2",
+            "'time' in row 2: time goes back from 2 s to 1.5 s",
         ),
         (
             text(table=TABLE.assign(time=SUMMER_TIME_ENDS)).encode(),
-            "goes back from 2025-10-26 02:59:59 UTC to 2025-10-26 02:00:00 UTC in row 11",
+            "in row 11: time goes back from 2025-10-26 02:59:59 UTC to 2025-10-26 02:00:00 UTC",
         ),
         (
             text(table=TABLE.assign(time=TABLE["time"].where(T != 1.0), N=1.0, psi=1.0)).encode(),
-            "'time' holds '' in row 3, no number or time",
+            "'time' in row 3: no time here",
         ),
         (text(table=TABLE.assign(time=1.0, N=1.0, psi=1.0).rename(columns={"time": "x"})).encode(), "none rises"),
     ],

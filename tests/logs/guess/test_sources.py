@@ -57,7 +57,7 @@ def test_a_folder_without_a_log(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="a folder without a log"):
         read_source(tmp_path)
     (tmp_path / "a.csv").write_text("no\n")
-    with pytest.raises(DataError, match=r"no file can be read: a\.csv"):
+    with pytest.raises(DataError, match=r"no file of this folder can be read: a\.csv"):
         read_source(tmp_path)
 
 
