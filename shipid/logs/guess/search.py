@@ -509,7 +509,7 @@ def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Comp
     named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
     free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:MOST_COLUMNS]
     total, found = float(np.sum(np.abs(seen) ** 2)), list[tuple[float, Velocity]]()
-    for kind, way in (("earth", np.ones(len(turn))), ("body", turn)):
+    for kind, way in (("earth", np.ones_like(turn)), ("body", turn)):
         paths = {one: evidence.integrate_rate(state.t, state.columns[one] * way) for one in free if one not in used}
         changes = {name: state.chosen.change(path) for name, path in paths.items()}
         for (first, a), (second, b), side in product(changes.items(), changes.items(), (1, -1)):
@@ -517,7 +517,7 @@ def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Comp
             cross, said = float(np.real(np.vdot(ran, seen))), _names_of_velocities(kind, first, second)
             rough = 1.0 - cross**2 / max(float(np.sum(np.abs(ran) ** 2)) * total, 1e-300)
             if first != second and cross > 0 and (rough < 0.9 or said >= 0.45):
-                ground = np.asarray((state.columns[first] + 1j * side * state.columns[second]) * way)
+                ground = np.asarray((state.columns[first] + 1j * side * state.columns[second]) * way, np.complex128)
                 one = Velocity(kind, first, second, side, ground, said, cost=float(kind == "earth" and side < 0))
                 found.append((rough / (SETTINGS.unnamed + said), one))
     return [one for _, one in sorted(found, key=lambda entry: entry[0])[:16]]
