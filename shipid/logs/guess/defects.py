@@ -75,10 +75,11 @@ def defects_of_motion(state: State) -> None:
 
 
 def _ask_if_course(state: State, body: Complex) -> None:
-    """Ask where a ship of velocities u + i v (N,) [m/s] does not drift as it turns: the heading may be the course."""
+    """Ask where the course is the heading of a ship that turns, so that u + i v (N,) [m/s] has no drift."""
     turns = np.abs(state.chosen.change(state.psi).real) > TURN_SHOWS
     drift = np.angle(body[((state.chosen.first + state.chosen.last) // 2)[turns]])
-    if len(drift) >= SEVERAL and np.mean(np.abs(drift) < EQUAL) > MOST:
+    logged = any(one.name == "course" for one in state.suggestions)
+    if logged and len(drift) >= SEVERAL and np.mean(np.abs(drift) < EQUAL) > MOST:
         words = "the ship does not drift as it turns: is the heading the course over ground? Then sway is not known, v"
         words += " is 0, and a heading is missing: name the column of a gyro or a compass"
         state.ask(("psi", "u", "v", "speed", "course"), words)
