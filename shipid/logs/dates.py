@@ -18,7 +18,7 @@ NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, bu
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
 WEEKS = 7 * 1024  # days after which the week number of GPS begins again
 TIME_OF_DAY = r"\s*(\d\d?):(\d\d)(?::(\d\d(?:[.,]\d+)?))?\s*([AaPp][Mm])?\s*"
-MOMENT = rf"^(?:(.*?\S)[\sT:/_-]+)??{TIME_OF_DAY}$"
+MOMENT = rf"^(?:(.*?\S)(?:[\sT_]+|(?<=\D\d\d\d):))??{TIME_OF_DAY}$"
 """A date, if there is one, and a time of day: its groups are these, hour, minute, second, and half of the day."""
 DAY_OF = (
     r"\d{4}[-/]\d\d?[-/]\d\d?|\d\d?(?P<mark>[./-])\d\d?(?P=mark)(\d{4}|\d\d)|\d\d?(?P<gap>[- ])[A-Za-z]{3}(?P=gap)\d{4}"
@@ -29,7 +29,7 @@ DAY_OF_EXCEL = r"(?:3[3-9]|4\d|5[0-4])\d{3}"
 EXCEL = 25569  # day of Excel of 1 January 1970
 FRACTION = r"0|0?\.\d+|\d(?:\.\d+)?[eE]-\d+"
 """A time of day as a part of a day."""
-UTC_BEHIND = r"\s+(?:UTC|GMT)$"
+UTC_BEHIND = r"(?:\s*Z|\s+(?:UTC|GMT))$"
 """The end of a date that says in letters that it has no other zone."""
 COMPACT = r"(\d{4})(\d\d)(\d\d)[-_ ]?(\d\d)(\d\d)(\d\d)(?:\.?(\d{1,8})\d?)?"
 """A date and a time of day in one number, or nearly: 20240514080000, 20240514080000.5, 20240514_080000."""
@@ -56,16 +56,8 @@ _SAID_OF_CLOCK = re.compile(
 """A zone in letters, in the name of a clock alone."""
 ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
 DAYS = (
-    "%Y-%m-%d",
-    "%Y-%j",
-    "%d.%m.%Y",
-    "%d.%m.%y",
-    "%d-%m-%Y",
-    "%m-%d-%Y",
-    "%d-%m-%y",
-    "%m-%d-%y",
-    "%y-%m-%d",
-    "%d-%b-%Y",
+    *("%Y-%m-%d", "%Y-%j", "%Y%m%d", "%d.%m.%Y", "%d.%m.%y", "%d-%b-%Y"),
+    *("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%y-%m-%d"),
 )
 """Ways in which a date may be written, with - for any other mark than a point."""
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it

@@ -18,6 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow
 
@@ -46,7 +47,6 @@ from shipid.users import locate_errors
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
 LARGE = 4_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
-BLOCK = 1_000_000  # bytes of such a text at once
 ROWS_AT_ONCE = 50_000  # of a text, whose cells are Python's until they are a column
 Progress = Callable[[float], None]
 
@@ -254,46 +254,58 @@ def _large_text(
     file: Path, form: TextFormat, wanted: set[str], progress: Progress | None, size: int
 ) -> pd.DataFrame | None:
     """Read only the wanted columns of a text log, block by block, as numbers; None where that cannot be done."""
+    if form.comment is not None or form.ragged == "drop":
+        return None
     source: Path | io.BytesIO = file
     with file.open("rb") as stream:
-        head = stream.read(BLOCK)
-    blanks, wide = form.separator == "whitespace", form.encoding.startswith(("utf-16", "utf-32"))
-    if form.comment is not None or form.ragged == "drop" or has_nul(head, form) or (blanks and wide):
-        return None
-    if blanks:
+        head = stream.read(1_000_000)
+    if form.separator == "whitespace":
+        if form.encoding.startswith(("utf-16", "utf-32")):
+            return None
         content = b"\n".join(b"\t".join(line.split()) for line in file.read_bytes().splitlines())
-        source, form, head = io.BytesIO(content), form.model_copy(update={"separator": "\t"}), content[:BLOCK]
+        source, form, head = io.BytesIO(content), form.model_copy(update={"separator": "\t"}), content[:1_000_000]
+    if has_nul(head, form):
+        return None
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
+    if not text:  # lines end with a carriage return alone
+        return None
     try:
         first = parse_text(text, form.model_copy(update={"ragged": "drop"}), file)
-        names = [str(name) for name in first.columns]
-        if sorted(name for name in names if name in wanted) != sorted(wanted):
-            return None
-        asked = first.iloc[:, [name in wanted for name in names]]
-        asked = asked.replace(",", ".", regex=True) if form.decimal == "," else asked
-        kinds = {
-            str(names.index(name)): pyarrow.float64() if known else pyarrow.string()
-            for name, known in asked.apply(pd.to_numeric, errors="coerce").notna().any().items()
-        }
-        cells = text.split("\n", form.skip_rows + 1)[form.skip_rows].count(form.separator) + 1  # some without a name
-        blocks = []
-        for number, block in enumerate(_read_blocks(source, form, max(len(names), cells), kinds), start=1):
-            blocks.append(block)
-            if progress is not None:
-                progress(min(1.0, number * BLOCK / size))
-        table = pyarrow.Table.from_batches(blocks)
-    except (DataError, pyarrow.ArrowException, UnicodeError, ValueError):  # such as where a line ends between quotes
+    except DataError:  # such as where the last line ends between quotes
         return None
-    nulls = [column.null_count for column in table.columns]
-    read: pd.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True, use_threads=False)
-    lost = read.isna()  # more of them are words that this mapping does not declare; an empty line is all its cells
-    return None if lost.sum().tolist() != nulls or lost.all(axis=1).any() else read.set_axis([*asked], axis=1)
+    names = [str(name) for name in first.columns]
+    places = [index for index, name in enumerate(names) if name in wanted]
+    if {names[index] for index in places} != wanted or len(places) != len(wanted):
+        return None
+    plain = {
+        index: bool(
+            pd.to_numeric(column.str.replace(",", ".") if form.decimal == "," else column, errors="coerce")
+            .notna()
+            .any()
+        )
+        for index in places
+        for column in [first.iloc[:, index]]
+    }
+    try:
+        cells = text.split("\n", form.skip_rows + 1)[form.skip_rows].count(form.separator) + 1  # some without a name
+        reader = _read_blocks(source, form, max(len(names), cells), plain)
+        about = size * max(1, len(first)) / len(text)  # rows
+        columns = _columns_of_blocks(reader, plain, about, progress)
+    except (pyarrow.ArrowException, UnicodeError, ValueError):
+        return None
+    if columns is None:
+        return None
+    table = pd.DataFrame({names[place]: values for place, values in columns.items()}, copy=False)
+    blank = np.ones(len(table), dtype=bool)
+    for name in table:
+        blank &= table[name].isna().to_numpy()
+    return None if blank.any() else table  # whether such a line is empty, only all its cells tell
 
 
 def _read_blocks(
-    source: Path | io.BytesIO, form: TextFormat, width: int, kinds: dict[str, pyarrow.DataType]
+    source: Path | io.BytesIO, form: TextFormat, width: int, plain: dict[int, bool]
 ) -> Iterator[pyarrow.RecordBatch]:
-    """The columns of a text log at some places, counted from 0, block by block."""
+    """The columns of a text log at some places, block by block; `plain` says which of them are numbers."""
     import pyarrow.csv as arrow
 
     pyarrow.set_io_thread_count(1)
@@ -304,19 +316,48 @@ def _read_blocks(
             column_names=[str(i) for i in range(width)],
             skip_rows=form.skip_rows + int(form.header and form.names is None),
             encoding=form.encoding,
-            block_size=BLOCK,
+            block_size=1_000_000,
             use_threads=False,
         ),
         arrow.ParseOptions(delimiter=form.separator, ignore_empty_lines=True),
         arrow.ConvertOptions(
-            include_columns=[*kinds],
-            column_types=kinds,
+            include_columns=[str(index) for index in plain],
+            column_types={str(i): pyarrow.float64() if plain[i] else pyarrow.string() for i in plain},
             null_values=list(form.missing),
             strings_can_be_null=True,
             decimal_point=form.decimal,
         ),
     )
     return blocks
+
+
+def _columns_of_blocks(
+    blocks: Iterable[pyarrow.RecordBatch], plain: dict[int, bool], about: float, progress: Progress | None
+) -> dict[int, np.ndarray[Any, Any]] | None:
+    """Whole columns by their place, of a log with `about` so many rows; None where a word stands among the numbers."""
+    expected = int(1.02 * about) + 1000  # rows: what is not filled takes no memory
+    numbers = {place: np.empty(expected) for place, of_numbers in plain.items() if of_numbers}
+    texts: dict[int, list[Any]] = {place: [] for place in plain if place not in numbers}
+    rows = 0
+    for batch in blocks:
+        before, rows = rows, rows + batch.num_rows
+        for place, column in zip(plain, batch.columns, strict=True):
+            values = column.to_numpy(zero_copy_only=False)
+            if place in texts:
+                texts[place].append(values)
+                continue
+            if np.count_nonzero(np.isnan(values)) > column.null_count:  # a word that this mapping does not declare
+                return None
+            if rows > len(numbers[place]):
+                more = np.empty(max(rows - len(numbers[place]), len(numbers[place]) // 4))
+                numbers[place] = np.concatenate([numbers[place], more])
+            numbers[place][before:rows] = values
+        if progress is not None and rows:
+            progress(min(1.0, rows / about))
+    return {
+        place: numbers[place][:rows] if of_numbers else np.concatenate([np.empty(0, object), *texts[place]])
+        for place, of_numbers in plain.items()
+    }
 
 
 def _start_threads(count: int) -> None:

@@ -42,6 +42,9 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
         ("%Y%m%d%H%M%S.%f", True),
         ("%Y%m%d%H%M%S%f", True),
         ("%Y%m%d_%H%M%S.%f", True),
+        ("%Y%m%d %H:%M:%S.%f", True),
+        ("%Y:%j:%H:%M:%S.%fZ", True),
+        ("%d/%m/%YT%H:%M:%S.%f", True),
         ("%Y-%m-%d %H:%M:%S.%f UTC", True),
         ("%d.%m.%Y %H:%M:%S.%f GMT", True),
         ("%H:%M:%S.%f UTC", False),
@@ -153,7 +156,7 @@ def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log:
     assert caught.value.path == "row 4"
 
 
-@pytest.mark.parametrize("text", ["14.05.2024 08:00:00 +02:00", "1715731140.5", "080000"])
+@pytest.mark.parametrize("text", ["14.05.2024 08:00:00 +02:00", "1715731140.5", "080000", "2024-05-14:08:00"])
 def test_a_time_that_cannot_be_read_is_shown(text: str, log: pd.DataFrame, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=rf"'{re.escape(text)}' is no date or time of day .* unit = \"s\"") as caught:
         import_written(mapping_with(tmp_path, "", DATED), log.assign(time=text), tmp_path)
