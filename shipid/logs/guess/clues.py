@@ -257,12 +257,8 @@ class State:
         free = [name for name in self.free() if np.ptp(self.columns[name]) > 0 and not is_order(name)]
         if not meanings:
             return [name for name in free if meaning_scores(name).get("", 0.0) < STRONG]
-        return [name for name in free if _may_be(self._united(name, meanings), meanings)]
-
-    @staticmethod
-    def _united(name: str, meanings: tuple[str, ...]) -> dict[str, float]:
-        """How well a name fits each meaning; as a quantity of no use where its unit fits none of those asked."""
-        return {"": 1.0} if all(unit_of_another(name, meaning) for meaning in meanings) else meaning_scores(name)
+        unfit = {name for name in free if all(unit_of_another(name, meaning) for meaning in meanings)}
+        return [name for name in free if _may_be({"": 1.0} if name in unfit else meaning_scores(name), meanings)]
 
     @property
     def numbered(self) -> bool:

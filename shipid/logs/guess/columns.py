@@ -20,22 +20,14 @@ from shipid.logs.guess.changes import ask_for_changes
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Clue, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
-from shipid.logs.guess.defects import (
-    defects_of_motion,
-    defects_of_rows,
-    defects_of_spikes,
-    take_lost_fixes,
-    take_spikes,
-    take_zeros,
-)
-from shipid.logs.guess.lapses import report_command_faults
+from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
+from shipid.logs.guess.lapses import report_command_faults, report_spikes, report_stuck_sensors, take_fills, take_spikes
 from shipid.logs.guess.motion import check_clock, choose_motion, report_misnomers
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.search import Frame
 from shipid.logs.guess.sniff import LogTable
 from shipid.logs.guess.sources import PAUSE, GuessFiles, read_source
-from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import unused_reasons
 from shipid.logs.guess.wind import choose_wind
 from shipid.logs.mapping import to_si
@@ -110,8 +102,7 @@ def guess(
     if source.parts:
         _report_run_parts(state, source)
     take_scales(state)
-    take_lost_fixes(state)
-    take_zeros(state)
+    take_fills(state)
     if len(state.chosen.first) < 5:
         rows = f"{len(sniffed.t)} rows over {sniffed.t[-1] - sniffed.t[0]:.3g} s are too few for a draft"
         clock = f"is {sniffed.clock['from']!r} the clock, in {sniffed.clock['unit']}?"
@@ -132,9 +123,9 @@ def guess(
     _choose_other_columns(state)
     choose_wind(state)
     defects_of_rows(state, sniffed)
-    find_stuck(state)
     report_command_faults(state, sniffed)
-    defects_of_spikes(state)
+    report_stuck_sensors(state)
+    report_spikes(state)
     ask_for_changes(state, PAUSE)
     defects_of_motion(state)
     left = unused_reasons(state, numbering)
@@ -158,14 +149,10 @@ def _choose_other_columns(state: State) -> None:
     """Choose roll, pitch and other environment columns by their names alone."""
     further = [name for name, row in rows_of_role("environment").items() if row.names and name not in ("V_w", "beta_w")]
     for meaning in ("phi", "theta", *further):
-        steep = {name for name in state.called(meaning) if _is_steep(state, name, meaning)}
-        for name in [name for name in state.called(meaning) if name not in steep][:1]:
-            unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
-            state.ask_for_unit(meaning, name, unit)
-            state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
-
-
-def _is_steep(state: State, name: str, meaning: str) -> bool:
-    """Whether a column called a roll or pitch is above 90 deg, and so is none: `stamp` is a pitch, and a time."""
-    top = float(np.abs(state.columns[name]).max())
-    return meaning in ("phi", "theta") and top * to_si(likely_unit(state, name, meaning), meaning) > np.pi / 2
+        for name in state.called(meaning):
+            unit, top = likely_unit(state, name, meaning), float(np.abs(state.columns[name]).max())
+            if meaning in further or top * to_si(unit, meaning) <= np.pi / 2:  # `stamp` is a pitch, and a time
+                why = "by its name" if meaning in further else "by its name; the log does not show its sign"
+                state.ask_for_unit(meaning, name, unit)
+                state.suggest(meaning, name, unit, 0.5, why)
+                break

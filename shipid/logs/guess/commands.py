@@ -56,7 +56,6 @@ def choose_commands(state: State) -> None:
     angles = _columns_named_for(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
     for name, signal in angles:
         _take_angle(state, r, name, signal, used)
-    _ask_about_sides(state)
     azimuth = any(signal == "alpha" for _, signal in angles)
     for signal in (signal for signal in rows_of_role("command") if not is_steering(signal)):
         named = _columns_named_for(state, [signal])
@@ -193,17 +192,6 @@ def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
         words = f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
         half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"
         state.ask(("alpha",), f"{words} Then write {half}; here 0 is a thrust ahead")
-
-
-def _ask_about_sides(state: State) -> None:
-    """Ask where the angles of two sides turn the ship to opposite sides."""
-    angles = [one for one in state.suggestions if is_command(one.name) and one.source in state.turning]
-    for one, other in combinations(angles, 2):
-        sides = {state.side_of(one.source), state.side_of(other.source)}
-        alike = signal_of(one.name) == signal_of(other.name) and sides == {"port", "starboard"}
-        if alike and state.turning[one.source] != state.turning[other.source]:
-            words = f"{one.source!r} and {other.source!r} are seen to turn the ship to opposite sides"
-            state.ask((one.name, other.name), f"{words}: do they count so, or is the sign of one wrong?")
 
 
 def _take_unnamed_rudder(state: State, r: Array, used: dict[str, int]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from collections.abc import Mapping as PlainMapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from shipid.logs import segments as cutting
 from shipid.logs.dates import format_date
 from shipid.logs.guess.clues import LIKELY, Clue, Suggestion
 from shipid.logs.guess.columns import Guess
-from shipid.logs.guess.defects import lost_fixes
+from shipid.logs.guess.lapses import FILLS
 from shipid.logs.importing import file_digest, import_log
 from shipid.logs.mapping import Mapping, Segment, degrees_and_minutes, is_date, is_dated, parse_mapping, to_si
 from shipid.logs.readers import LARGE
@@ -104,57 +105,52 @@ def _parse_draft(text: str) -> Mapping:
     return parse_mapping(raw, Path("draft.toml"))
 
 
-def _toml_lines(values: dict[str, Any]) -> Iterator[str]:
+def _toml_lines(values: PlainMapping[str, Any]) -> Iterator[str]:
     for key, value in values.items():
-        yield f"{key} = {tomlkit.item(value).as_string()}"
+        yield f"{tomlkit.key(key).as_string()} = {tomlkit.item(value).as_string()}"
+
+
+def _block(name: str, values: PlainMapping[str, Any], remark: str = "") -> Iterator[str]:
+    """Yield the lines of a table, with a remark beside its name."""
+    yield f"\n{name if name.startswith('[') else f'[{name}]'}{'    # ' * bool(remark)}{remark}"
+    yield from _toml_lines(values)
 
 
 def _draft_head(guess: Guess) -> Iterator[str]:
+    source, sniffed = guess.source, guess.sniffed
     yield f"# Drafted from {guess.file.name}. Check every line: a percentage says how sure it is, the rest why."
-    yield from (f"# ? {question.sentence}" for question in guess.questions)
-    wind = {"V_w", "beta_w"} & {suggestion.name for suggestion in guess.columns}
-    yield from (f"# ? {question}" for question in (*QUESTIONS, *([OF_WIND] if wind else [])))
-    source = guess.source
+    wind = [OF_WIND] if guess.column("V_w") or guess.column("beta_w") else []
+    yield from (f"# ? {words}" for words in (*(one.sentence for one in guess.questions), *QUESTIONS, *wind))
     yield from _toml_lines({"name": guess.file.stem or "log"})
-    yield "\n[source]"
     if source.pattern is None:
-        yield from _toml_lines({"sha256": file_digest(guess.file)})
+        yield from _block("source", {"sha256": file_digest(guess.file)})
     else:
-        yield f"# {len(source.files)} files, {'see [parts]' if source.parts else 'one run each'}"
-        yield from _toml_lines({"runs": source.pattern})
-        if source.skipped:
-            yield from (f"# ! {name} is left out: {reason}" for name, reason in source.skipped.items())
-            ending = source.pattern.rpartition("*")[2]
-            alike = [name for name in source.skipped if name.endswith(ending)]
-            yield from _toml_lines({"skip": alike} if alike else {})
-        if source.manoeuvres:
-            yield "[source.manoeuvres]    # as the names of the files say"
-            yield from (
-                f"{tomlkit.item(run).as_string()} = {tomlkit.item(kind).as_string()}"
-                for run, kind in source.manoeuvres.items()
-            )
+        alike = [name for name in source.skipped if name.endswith(source.pattern.rpartition("*")[2])]
+        remark = f"{len(source.files)} files, {'see [parts]' if source.parts else 'one run each'}"
+        yield from _block("source", {"runs": source.pattern} | ({"skip": alike} if alike else {}), remark)
+        yield from (f"# ! {name} is left out: {reason}" for name, reason in source.skipped.items())
+    if source.manoeuvres:
+        yield from _block("source.manoeuvres", source.manoeuvres, "as the names of the files say")
     if source.parts:
-        yield f"\n[parts]    # where runs begin: {source.held} runs in {len(source.files)} files"
-        yield from _toml_lines(source.parts)
-    yield "\n[format]"
-    yield from _toml_lines(guess.sniffed.form)
-    yield "\n[clock]"
-    yield from _toml_lines(guess.sniffed.clock)
-    scattered = guess.sniffed.scattered
+        remark = f"where runs begin: {source.held} runs in {len(source.files)} files"
+        yield from _block("parts", source.parts, remark)
+    yield from _block("format", sniffed.form)
+    yield from _block("clock", sniffed.clock)
     first = guess.columns[0].source
-    steps = np.diff(guess.sniffed.t[np.isfinite(guess.sniffed.columns[first])] if scattered else guess.sniffed.t)
-    usual = float(np.median(steps))
+    usual = float(
+        np.median(np.diff(sniffed.t[np.isfinite(sniffed.columns[first])] if sniffed.scattered else sniffed.t))
+    )
     longest = max(3.0, 5 * usual)
     sparse = [
         column.source
         for column in guess.columns
         if is_command(column.name) and _is_sparse_order(guess, column, longest)
     ]
-    if sparse and not scattered:
-        yield f"step = {usual:g}    # s: {', '.join(map(repr, sparse))} has values where it changes: held in between"
-    if scattered:
-        yield f"step = {usual:g}    # s: sentences or topics have other instants; this is the step of the position"
-    if scattered or guess.kinds & {"holes in time", "missing values"}:
+    if sparse or sniffed.scattered:
+        why = f"{', '.join(map(repr, sparse))} has values where it changes: held in between"
+        why = "sentences or topics have other instants; this is the step of the position" if sniffed.scattered else why
+        yield f"step = {usual:g}    # s: {why}"
+    if sniffed.scattered or guess.kinds & {"holes in time", "missing values"}:
         yield f"max_gap = {longest:g}    # s: missing for less: interpolated, for more: the run breaks"
 
 
@@ -168,57 +164,45 @@ def _origin_lines(guess: Guess) -> Iterator[str]:
     """Yield the [origin] that the files of all runs share, and that of a log whose first position may be none."""
     columns = [column for key in ("latitude", "longitude") if (column := guess.column(key)) is not None]
     if columns and (guess.source.pattern is not None or "no fix" in guess.kinds):
-        yield f"\n[origin]    # the first position{', of all runs' if guess.source.pattern is not None else ''}"
-        places = [guess.sniffed.columns[column.source] for column in columns]
-        known = np.isfinite(places).all(axis=0)
-        fixed = ~np.any([lost_fixes(values[known]) for values in places], axis=0)
-        for column, values in zip(columns, places, strict=True):
-            first = values[known][fixed][:1]
-            first = degrees_and_minutes(first) if column.unit == "ddmm" else first * column.extra.get("factor", 1.0)
-            first = np.degrees(first) if column.unit == "rad" else first
-            yield from _toml_lines({column.name: round(column.extra.get("sign", 1) * float(first[0]), 7)})
+        places = np.array([guess.sniffed.columns[column.source] for column in columns])
+        first = places[:, np.flatnonzero((np.isfinite(places) & ~np.isin(places, FILLS)).all(axis=0))[:1]]
+        origin = {}
+        for column, value in zip(columns, first, strict=True):
+            value = degrees_and_minutes(value) if column.unit == "ddmm" else value * column.extra.get("factor", 1.0)
+            value = np.degrees(value) if column.unit == "rad" else value
+            origin[column.name] = round(column.extra.get("sign", 1) * float(value[0]), 7)
+        yield from _block("origin", origin, f"the first position{', of all runs' * (guess.source.pattern is not None)}")
 
 
 def _column_lines(guess: Guess) -> Iterator[str]:
-    findings = [finding for finding in guess.findings if finding.repair is None]
-    if findings:
-        yield ""
-        yield from (f"# ! {_clue_text(finding)}" for finding in findings)
+    yield ""
+    yield from (f"# ! {_clue_text(finding)}" for finding in guess.findings if finding.repair is None)
     for column in guess.columns:
-        sure = f"{_confidence_text(column.confidence)}{', UNSURE' * (column.confidence < LIKELY)}"
-        key = f'"{column.name}"' if "." in column.name else column.name
-        yield f"\n[columns.{key}]    # {sure}: {column.evidence}"
+        sure = f"{100 * column.confidence:.0f} %{', UNSURE' * (column.confidence < LIKELY)}"
         parts = guess.sniffed.in_parts.get(column.source, (column.source,))
-        source = parts[0] if len(parts) == 1 else parts
-        yield from _toml_lines({"from": source, "unit": column.unit, **column.extra})
-    unused = [*(f"column {name!r} is not used: {why}" for name, why in guess.unused.items()), *guess.sniffed.notes]
-    if unused:
-        yield ""
-        yield from (f"# {words}" for words in unused)
-
-
-def _confidence_text(confidence: float) -> str:
-    return f"{100 * confidence:.0f} %"
+        values = {"from": parts[0] if len(parts) == 1 else parts, "unit": column.unit, **column.extra}
+        key = f'"{column.name}"' if "." in column.name else column.name
+        yield from _block(f"columns.{key}", values, f"{sure}: {column.evidence}")
+    yield ""
+    yield from (f"# column {name!r} is not used: {why}" for name, why in guess.unused.items())
+    yield from (f"# {words}" for words in guess.sniffed.notes)
 
 
 def _estimate_lines(guess: Guess) -> Iterator[str]:
     """Yield the [estimate] block if only velocities are missing in the log."""
     named = {column.name for column in guess.columns}
-    lacking = [name for name in ("u", "v", "r") if name not in named]
-    if "speed" in named:
-        lacking = [name for name in lacking if name == "r"]
+    lacking = [name for name in ("u", "v", "r") if name not in named and (name == "r" or "speed" not in named)]
     if lacking:
-        yield f"\n[estimate]    # {', '.join(lacking)} not logged; noise is assumed: the import shows whether it fits"
-        yield from _toml_lines(NOISE)
+        remark = f"{', '.join(lacking)} not logged; noise is assumed: the import shows whether it fits"
+        yield from _block("estimate", NOISE, remark)
 
 
 def _repair_lines(guess: Guess) -> Iterator[str]:
     mendable = [(finding, finding.repair) for finding in guess.findings if finding.repair is not None]
     for finding, repair in sorted(mendable, key=lambda entry: ORDER.index(entry[1]["kind"])):
-        yield "\n[[repair]]"
-        yield from _toml_lines(repair)
-        yield from _toml_lines({"enabled": finding.confidence >= ENABLED, "reason": _clue_text(finding)})
+        more = {"enabled": finding.confidence >= ENABLED, "reason": _clue_text(finding)}
+        yield from _block("[[repair]]", repair | more)
 
 
 def _clue_text(finding: Clue) -> str:
-    return f"{finding.kind} ({_confidence_text(finding.confidence)}): {finding.sentence}"
+    return f"{finding.kind} ({100 * finding.confidence:.0f} %): {finding.sentence}"

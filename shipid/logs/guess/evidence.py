@@ -88,17 +88,11 @@ def fit_scale(seen: Complex, integrated: Complex) -> Fit:
     return Fit(scale, error, float(np.sum(np.abs(seen - scale * integrated) ** 2)) / total)
 
 
-def windows_without_outliers(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
-    """Which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out."""
-    scale = fit_scale(seen, integrated).scale
-    miss, size = np.abs(seen - scale * integrated), np.abs(integrated)
-    moving = size >= LIVELY * np.percentile(size, 90)
-    return np.asarray(miss <= 6.0 * np.median(miss[moving]) + 1e-9)
-
-
 def fit_without_outliers(seen: Complex, integrated: Complex) -> Fit:
-    """Fit one real scale to the windows without outliers."""
-    keep = windows_without_outliers(seen, integrated)
+    """Fit one real scale to the windows without spikes and jumps: outliers in their unexplained change."""
+    miss, size = np.abs(seen - fit_scale(seen, integrated).scale * integrated), np.abs(integrated)
+    moving = size >= LIVELY * np.percentile(size, 90)
+    keep = miss <= 6.0 * np.median(miss[moving]) + 1e-9
     return fit_scale(seen[keep], integrated[keep])
 
 
@@ -176,8 +170,8 @@ def _stretch_numbers(t: Array) -> NDArray[np.int_]:
     return np.append(0, np.cumsum(np.diff(t) > GAP * np.median(np.diff(t))))
 
 
-def position_jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
-    """Where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m])."""
+def position_jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[int, int, float]]:
+    """Where a position leaves its integrated velocity in one step: rows before and after, and lasting error [m]."""
     usual = float(np.median(np.diff(t)))
     reach = max(1, round(2.0 / usual))
     if len(t) < 20 * reach:
@@ -198,23 +192,12 @@ def position_jumps(t: Array, position: Complex, integrated: Complex) -> list[tup
         around = 3 * reach
         before, after = drift[max(first, start - around) : start + 1], drift[end : min(last, end + around + 1)]
         stays = abs(_complex_median(after) - _complex_median(before))
-        leaps.append((float(t[start]), float(t[end]), float(stays)))
+        leaps.append((int(start), int(end), float(stays)))
     return leaps
 
 
 def _complex_median(points: Complex) -> complex:
     return complex(np.median(points.real), np.median(points.imag))
-
-
-def interpolated_share(values: Array) -> float:
-    """The share of rows exactly on the line between their neighbours, among rows where a value changes."""
-    first, second = np.diff(values), np.diff(values, 2)
-    moving = (first[1:] != 0.0) & (first[:-1] != 0.0)
-    quantum = np.min(np.abs(first[first != 0.0])) if np.any(first != 0.0) else 0.0
-    scale = float(np.ptp(values))
-    if moving.sum() < 50 or quantum > 1e-5 * scale:  # rounded values lie on lines by chance
-        return 0.0
-    return float(np.mean(np.abs(second[moving]) < 1e-9 * scale))
 
 
 def spike_rows(values: Array) -> NDArray[np.bool_]:

@@ -13,7 +13,6 @@ from shipid.logs.guess.clues import State, si_unit, unit_in_name
 from shipid.logs.guess.evidence import Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
-    LENGTHS,
     PLAIN,
     WAYS,
     Axes,
@@ -27,12 +26,11 @@ from shipid.logs.guess.search import (
     search_motion,
 )
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores
+from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores
 from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
 from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
 
-ABREAST = np.radians(0.5)  # by which two headings of one ship may differ
 FASTEST, HARDEST, SLOWEST = 100.0, 20.0, 0.02  # m/s, m/s^2, m/s: no ship goes or turns harder, no trial is slower
 FROUDE = 4.0  # U / sqrt(g L): nothing that is steered in trials is faster for its length
 FAR = 2.0  # a factor that no sensor has
@@ -152,7 +150,7 @@ def _reading_in_words(best: MotionReading, axes: Axes) -> str:
 
 
 def _ask_about_names(state: State, best: MotionReading) -> None:
-    """Ask about what names say of position and heading: a magnetic compass, set points, ship lengths, no agreement."""
+    """Ask about what names say of position and heading: a magnetic compass, set points, no agreement."""
     pose = best.pose
     first, second = pose.place.first, pose.place.second
     if is_magnetic(pose.heading):
@@ -164,10 +162,6 @@ def _ask_about_names(state: State, best: MotionReading) -> None:
     if pose.misfit > SETTINGS.poor and not shown and not state.numbered:
         words = f"course and heading agree badly (misfit {pose.misfit:.2f}): are {first!r}, {second!r} the position"
         state.ask(("psi", "north", "east", "u", "v", "r"), f"{words} and {pose.heading!r} the heading?")
-    lengths = [name for name in (first, second) if LENGTHS.search(name)]
-    if lengths:
-        words = f"{' and '.join(map(repr, lengths))} are in ship lengths by their names"
-        state.ask(("north", "east", "u", "v"), f"{words}: write factor = the length in m")
     references = [name for name in (first, second, pose.heading) if may_be_measured(name)]
     if references:
         words = f"is {', '.join(map(repr, references))} measured, or a set point? By the name it may be either"
@@ -175,7 +169,7 @@ def _ask_about_names(state: State, best: MotionReading) -> None:
 
 
 def _ask_about_rivals(state: State, motions: list[MotionReading]) -> None:
-    """Ask where another column may be the heading nearly as well, and where a second heading differs from the first."""
+    """Ask where another column may be the heading nearly as well."""
     best, heading = motions[0], motions[0].pose.heading
     found = best.velocity
     others = [one for one in motions[1:] if one.pose.heading != heading and one.cost < best.cost + SETTINGS.close]
@@ -185,18 +179,6 @@ def _ask_about_rivals(state: State, motions: list[MotionReading]) -> None:
         words = f"is {heading!r} the heading and {other!r} the course, or are they exchanged? No ship drifts into its"
         about = ("psi", "north", "east", "u", "v", "r", "speed", "course")
         state.ask(about, f"{words} turns; a run in a known current, or the column of a gyro, tells")
-    named = [name for name in state.all_called("psi") if not is_order(name) and not is_magnetic(name)]
-    named = [name for name in named if meaning_scores(name)["psi"] > meaning_scores(name).get("course", 0.0)]
-    angles = {
-        name: np.exp(1j * to_si(unit_in_name(name, "rad") or best.pose.unit, "psi") * state.columns[name])
-        for name in named
-    }
-    for name in named if heading in named else ():
-        apart = np.angle(angles[name] * np.conj(angles[heading]))
-        usual = float(np.median(apart))
-        if ABREAST < abs(usual) < np.pi / 4 and float(np.median(np.abs(apart - usual))) < ABREAST:
-            words = f"{heading!r} and {name!r} differ by {np.degrees(abs(usual)):.1f} deg: which is the heading?"
-            state.ask(("psi", "v"), f"{words} {heading!r} is drafted, as it keeps closer to the track")
 
 
 # --- velocities ---
@@ -327,24 +309,16 @@ def _take_rate(state: State, best: MotionReading) -> None:
     state.r = state.columns[name] * to_si(unit, "r") * sign
 
 
-def ship_pace(state: State) -> tuple[float, float]:
-    """How fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
-    span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    speeds = np.abs(state.chosen.change(state.position)) / span
-    rates = np.abs(state.chosen.change(state.psi)) / span
-    return float(np.percentile(speeds, 90)), float(np.percentile(speeds * rates, 90))
-
-
 def check_clock(state: State, length: float = np.inf) -> None:
     """Ask for the unit of the clock where no ship goes so fast, or so slowly. length : of the ship [m], if known."""
-    speed, across = ship_pace(state)
+    span = state.t[state.chosen.last] - state.t[state.chosen.first]
+    speeds, rates = (np.abs(state.chosen.change(one)) / span for one in (state.position, state.psi))
+    speed, across = (float(np.percentile(one, 90)) for one in (speeds, speeds * rates))
     possible = SLOWEST < speed < min(FASTEST, FROUDE * np.sqrt(GRAVITY * length)) and across < HARDEST
-    if possible or any("t" in question.about for question in state.questions):
-        return
-    words = (
-        f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
-    )
-    state.ask(("t", "north", "east"), f"{words}: are the units of the clock and of the positions right?")
+    if not possible and not any("t" in question.about for question in state.questions):
+        words = f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at"
+        words += f" {across:.3g} m/s^2: are the units of the clock and of the positions right?"
+        state.ask(("t", "north", "east"), words)
 
 
 def report_misnomers(state: State) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
 from pathlib import Path
 from typing import Literal, get_args
@@ -39,9 +39,6 @@ DIRECTIONS = frozenset("north east este".split())
 OTHER_WAY = frozenset("w west ouest oeste vest south sud sur syd zuid".split())
 """Parts of the name of a longitude or latitude that counts to the west or south."""
 YAW = frozenset(["yaw", "theta"])
-RADIUS, OFF_RADIUS = 6.368e6, 2.5e4  # m: from the centre of the Earth to its ellipsoid, with hills
-LENGTHS = re.compile(r"/ ?L(?:_?(?:pp|bp|wl|oa))?\b", re.IGNORECASE)
-"""The end of the name of a position in ship lengths, such as X/Lpp."""
 MOST_COLUMNS, MOST_WINDOWS = 24, 400  # that are tried where no name helps; in the first ranking
 PLAIN = ("m/s", "kn", "km/h")  # units of speed that logs usually have
 WAYS = ("north", "east", "south", "west")
@@ -139,12 +136,12 @@ class Velocity:
     first: str
     second: str
     side: int
-    fit: Fit
     ground: Complex
     named: float
-    cost: float
     turn: float = 360.0
     sense: Sense = Sense()
+    fit: Fit = field(default=Fit(0.0, np.inf, 1.0))
+    cost: float = 0.0
     unsure: bool = False
 
 
@@ -179,7 +176,6 @@ def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[
 
     Raises DataError if no column can be the position or the heading, or if the ship does not move as in that frame.
     """
-    _refuse_ecef(state, file)
     places, headings = list(_named_places(state)), _named_headings(state)
     for again in (True, False):
         poses = _rank_poses(state, places, headings)
@@ -248,12 +244,6 @@ def _pose_beyond_names(state: State, named: list[Pose], places: list[Place], hea
     ways = [name for name in dict.fromkeys([*headings, *free]) if name not in courses]
     found = _rank_poses(state, [*places, *wide], ways)
     found = [one for one in found if one.misfit < SETTINGS.poor]
-    if named and found and found[0].cost < named[0].cost and not (state.numbered or state.findings):
-        old, new = named[0], found[0]
-        words = ", ".join(map(repr, (old.place.first, old.place.second, old.heading)))
-        sources = new.place.first, new.place.second, new.heading
-        words += f" do not fit together as position and heading (misfit {old.misfit:.2f}); "
-        state.find("misleading names", sources, 0.6, f"{words}{', '.join(map(repr, sources))} do ({new.misfit:.3f})")
     return sorted([*named, *(one for one in found if one not in named)], key=lambda one: one.cost)
 
 
@@ -293,26 +283,26 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
 
 def senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     """How an angle, exp(i angle) (W,), may count in the plane of a track (W,): misfit and sense, the better first."""
-    means = _mean_turns(track, way)
-    quarters = [(round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1 for mean in means]
-    senses = [(1.0 - abs(mean), Sense(sign, one)) for sign, mean, one in zip((1, -1), means, quarters, strict=True)]
+    senses = [
+        (1.0 - abs(mean), Sense(sign, (round(float(np.angle(mean)) / (np.pi / 2)) + 1) % 4 - 1))
+        for sign, mean in _mean_turns(track, way)
+    ]
     return sorted(senses, key=lambda one: one[0])
 
 
 def _all_senses(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     """All senses of an angle, exp(i angle) (W,), in the plane of a track (W,), with their misfits."""
-    signed = zip((1, -1), _mean_turns(track, way), strict=True)
     return [
         (1.0 - (mean * np.exp(-0.5j * np.pi * one)).real, Sense(sign, one))
-        for sign, mean in signed
+        for sign, mean in _mean_turns(track, way)
         for one in range(-1, 3)
     ]
 
 
-def _mean_turns(track: Complex, way: Complex) -> list[complex]:
-    """The mean of a track (W,) seen from an angle, exp(i angle) (W,), that counts with it, and against it."""
+def _mean_turns(track: Complex, way: Complex) -> list[tuple[int, complex]]:
+    """Sign of an angle, exp(i angle) (W,), and the mean of a track (W,) seen from the angle where it counts so."""
     size = max(float(np.sum(np.abs(track))), 1e-12)
-    return [complex(np.sum(track * one)) / size for one in (np.conj(way), way)]
+    return [(sign, complex(np.sum(track * one)) / size) for sign, one in ((1, np.conj(way)), (-1, way))]
 
 
 def _turns_of_angle(state: State, name: str) -> Iterator[tuple[float, float]]:
@@ -488,49 +478,49 @@ def _is_compass(name: str) -> bool:
 
 def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) -> Iterator[Velocity]:
     """Yield pairs of columns whose integral is the track: velocities of the Earth or of the ship, speed and course."""
-    used = {pose.place.first, pose.place.second, pose.heading}
+    turn, used = np.exp(1j * theta), {pose.place.first, pose.place.second, pose.heading}
+    for one in [*_pairs_of_velocities(state, used, seen, turn), *_speeds_and_courses(state, used, seen)]:
+        fit = _fit_of_path(state, seen, one.ground)
+        sure, usual = one.named >= (0.75 if one.kind == "course" else 0.45), _is_speed_unit(fit.scale)
+        if fit.scale <= 0 or not (sure or usual) or fit.left > (SETTINGS.named_left if sure else SETTINGS.left):
+            continue
+        cost = one.cost + float(np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + one.named))) + (not usual)
+        unsure, drift = False, _drift_in_turns(state, one.ground, theta)
+        if one.kind == "body":  # against its mirror image, by the track, and by a ship's drift out of its turns
+            mirror = _fit_of_path(state, seen, np.conj(one.ground / turn) * turn)
+            by_track = float(np.log((fit.left + 1e-6) / (mirror.left + 1e-6)))
+            cost += max(by_track, 0.0) - float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)
+            cost += 0.1 * (one.side != pose.sense.sign)
+            unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
+        elif one.kind == "course" and drift > 0.5 and not pose.astern:
+            ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
+            unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left
+        yield replace(one, fit=fit, cost=cost, unsure=unsure)
+
+
+def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
+    """How the integral of velocities (N,) in the plane fits the track (W,)."""
+    return evidence.fit_without_outliers(seen, state.chosen.change(evidence.integrate_rate(state.t, ground)))
+
+
+def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Complex) -> list[Velocity]:
+    """The pairs of columns that may be velocities of the Earth or of the ship, by name and by a rough fit."""
     words = ("u", "v", "velocity_north", "velocity_east")
     named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
     free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:MOST_COLUMNS]
-    free = [name for name in free if name not in used]
-    turn = np.exp(1j * theta)
-    paths = {name: evidence.integrate_rate(state.t, state.columns[name]) for name in free}
-    along = {name: evidence.integrate_rate(state.t, state.columns[name] * turn) for name in free}
-    total = float(np.sum(np.abs(seen) ** 2))
-    found = []
-    for kind, integrals in (("earth", paths), ("body", along)):
-        changes = {name: state.chosen.change(one) for name, one in integrals.items()}
-        for first, second, side in product(free, free, (1, -1)):
-            if first == second:
-                continue
-            ran = changes[first] + 1j * side * changes[second]
-            power = float(np.sum(np.abs(ran) ** 2))
-            cross = float(np.real(np.vdot(ran, seen)))
-            named_as = _names_of_velocities(kind, first, second)
-            rough = 1.0 - cross**2 / max(power * total, 1e-300)
-            if cross > 0 and (rough < 0.9 or named_as >= 0.45):
-                found.append((rough, kind, first, second, side, named_as, integrals))
-    best = sorted(found, key=lambda one: one[0] / (SETTINGS.unnamed + one[5]))[:16]
-    for _, kind, first, second, side, named_as, integrals in best:
-        change = state.chosen.change(integrals[first] + 1j * side * integrals[second])
-        fit = evidence.fit_without_outliers(seen, change)
-        usual = _is_speed_unit(fit.scale)
-        if not fit.scale > 0 or not (named_as >= 0.45 or usual):
-            continue
-        if fit.left > (SETTINGS.named_left if named_as >= 0.45 else SETTINGS.left):
-            continue
-        ground = np.asarray(state.columns[first] + 1j * side * state.columns[second])
-        cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + named_as)) + (not usual)
-        unsure = False
-        if kind == "earth":
-            cost += 1.0 * (side < 0)
-        else:
-            ground = ground * turn
-            mirror = state.chosen.change(integrals[first] - 1j * side * integrals[second])
-            more, unsure = _side_cost_of_sway(state, ground, theta, seen, change, mirror)
-            cost += more + 0.1 * (side != pose.sense.sign)
-        yield Velocity(kind, first, second, side, fit, ground, named_as, float(cost), unsure=unsure)
-    yield from _speeds_and_courses(state, pose, seen, theta)
+    total, found = float(np.sum(np.abs(seen) ** 2)), list[tuple[float, Velocity]]()
+    for kind, way in (("earth", np.ones_like(turn)), ("body", turn)):
+        paths = {one: evidence.integrate_rate(state.t, state.columns[one] * way) for one in free if one not in used}
+        changes = {name: state.chosen.change(path) for name, path in paths.items()}
+        for (first, a), (second, b), side in product(changes.items(), changes.items(), (1, -1)):
+            ran = a + 1j * side * b
+            cross, said = float(np.real(np.vdot(ran, seen))), _names_of_velocities(kind, first, second)
+            rough = 1.0 - cross**2 / max(float(np.sum(np.abs(ran) ** 2)) * total, 1e-300)
+            if first != second and cross > 0 and (rough < 0.9 or said >= 0.45):
+                ground = np.asarray((state.columns[first] + 1j * side * state.columns[second]) * way, np.complex128)
+                one = Velocity(kind, first, second, side, ground, said, cost=float(kind == "earth" and side < 0))
+                found.append((rough / (SETTINGS.unnamed + said), one))
+    return [one for _, one in sorted(found, key=lambda entry: entry[0])[:16]]
 
 
 def _names_of_velocities(kind: str, first: str, second: str) -> float:
@@ -542,50 +532,22 @@ def _names_of_velocities(kind: str, first: str, second: str) -> float:
     return max(min(north, east), other, 0.5 * min(ahead, abeam))
 
 
-def _speeds_and_courses(state: State, pose: Pose, seen: Complex, theta: Array) -> Iterator[Velocity]:
-    used = {pose.place.first, pose.place.second, pose.heading}
-    speeds = [name for name in state.called("speed") if name not in used]
-    courses = [name for name in state.called("course") if not is_order(name)]
+def _speeds_and_courses(state: State, used: set[str], seen: Complex) -> Iterator[Velocity]:
+    """Yield speeds with courses over ground in every unit, in the sense in which they keep to the track."""
+    speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
     if state.numbered:
         speeds = courses = state.eligible()[:MOST_COLUMNS]
     middle = (state.chosen.first + state.chosen.last) // 2
-    for name in dict.fromkeys(courses):
-        for turn, more in _turns_of_angle(state, name) if name not in used else ():
+    for name in (name for name in dict.fromkeys(courses) if name not in used):
+        for turn, more in _turns_of_angle(state, name):
             angle = _angle(state, name, turn)
-            way = np.exp(1j * angle)
-            misfit, sense = senses_of_angle(seen, way[middle])[0]
-            if misfit > SETTINGS.named_left:
-                continue
+            misfit, sense = senses_of_angle(seen, np.exp(1j * angle)[middle])[0]
             plane = np.exp(1j * sense.direction(angle))
-            for speed in speeds:
-                if speed == name:
-                    continue
-                ground = np.asarray(state.columns[speed] * plane)
-                change = state.chosen.change(evidence.integrate_rate(state.t, ground))
-                fit = evidence.fit_without_outliers(seen, change)
+            for speed in speeds if misfit <= SETTINGS.named_left else ():
                 named = (meaning_scores(speed).get("speed", 0.0) + meaning_scores(name).get("course", 0.0)) / 2
-                if fit.scale <= 0 or fit.left > (SETTINGS.named_left if named >= 0.75 else SETTINGS.left):
-                    continue
-                if named >= 0.75 or _is_speed_unit(fit.scale):
-                    cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + named)) + more + 0.5
-                    ahead = evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * theta))
-                    better = _positive_left(seen, state.chosen.change(ahead)) < 0.5 * fit.left
-                    inward = better and not pose.astern and _drift_in_turns(state, ground, theta) > 0.5
-                    yield Velocity("course", speed, name, 1, fit, ground, named, float(cost), turn, sense, inward)
-
-
-def _side_cost_of_sway(
-    state: State, ground: Complex, theta: Array, seen: Complex, change: Complex, mirror: Complex
-) -> tuple[float, bool]:
-    """What speaks against the side of a sway beside its mirror image, by the track and by a ship's drift out of turns.
-
-    Also whether the track leaves it open.
-    """
-    left = [evidence.fit_without_outliers(seen, ran).left + 1e-6 for ran in (change, mirror)]
-    by_track = float(np.log(left[0] / left[1]))
-    drift = _drift_in_turns(state, ground, theta)
-    by_drift = -float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)
-    return max(by_track, 0.0) + by_drift, abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
+                ground = np.asarray(state.columns[speed] * plane)
+                if speed not in (name, *used):
+                    yield Velocity("course", speed, name, 1, ground, named, turn, sense, cost=more + 0.5)
 
 
 def _drift_in_turns(state: State, ground: Complex, theta: Array) -> float:
@@ -618,15 +580,10 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
     for name in dict.fromkeys([*state.eligible("r"), *others]):
         if name in used:
             continue
-        fits = [
-            ("", evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name]))))
-        ]
-        coded = rates_of_ais(state, name)
-        if coded is not None:
-            fits.append(
-                ("ais", evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, coded))))
-            )
-        for unit, fit in fits:
+        for unit, values in (("", state.columns[name]), ("ais", rates_of_ais(state, name))):
+            if values is None:
+                continue
+            fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, values)))
             scale = max(abs(fit.scale), 1e-12)
             known = [unit] if unit else [one for one in UNITS["rad/s"] if one != "ais"]
             unit = min(known, key=lambda one: abs(np.log(scale / UNITS["rad/s"][one])))
@@ -679,20 +636,6 @@ def _within_globe(state: State, north: str, east: str) -> bool:
 def _may_be_globe(state: State, north: str, east: str) -> bool:
     sizes = [(float(np.ptp(one)), abs(float(one.mean()))) for one in (state.columns[north], state.columns[east])]
     return _within_globe(state, north, east) and all(0.0 < width <= 1.0 and mean > 20 * width for width, mean in sizes)
-
-
-def _refuse_ecef(state: State, file: Path) -> None:
-    """Raise DataError where x, y, z count from the centre of the Earth: no plane of two of them is level."""
-    for name in state.columns:
-        place = name.lower().rfind("x")
-        letters = "XYZ" if "X" in name[place : place + 1] else "xyz"
-        three = [f"{name[:place]}{letter}{name[place + 1 :]}" for letter in letters]
-        if place >= 0 and {*three} <= state.columns.keys():
-            far = np.linalg.norm([state.columns[one] for one in three], axis=0)
-            if np.all(np.abs(far - RADIUS) < OFF_RADIUS):
-                words = ", ".join(map(repr, three))
-                remedy = "write latitude and longitude, such as by pymap3d.ecef2geodetic"
-                raise DataError(f"{words} count from the centre of the Earth: {remedy}", file=file)
 
 
 def _what_is_missing(state: State, position: bool) -> str:

@@ -1,5 +1,8 @@
 """What was put into a log is named, and nothing else; every documented trap of the recorded sets is detected."""
 
+from __future__ import annotations
+
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,8 +59,9 @@ def test_velocities_through_the_water_are_named_with_the_current(along: bool, tm
         drifted = drifted.drop(columns=["u", "v"]).assign(speed=np.hypot(log["u"], log["v"]), cog=course)
     proposal = guess_of(tmp_path, drifted.round(4))
     (found,) = [finding for finding in proposal.findings if finding.kind == "speed through water"]
-    assert f"a current of {abs(stream):.2g} m/s towards" in found.sentence
-    assert 190.0 < float(found.sentence.split("towards ")[1].split(" deg")[0]) < 210.0
+    sizes = re.search(r"velocity through water = (\S+) \[.*?\], (\S+) \[", found.sentence)
+    assert sizes
+    assert complex(float(sizes[1]), float(sizes[2])) == pytest.approx(stream, rel=0.15)
 
 
 def test_gunnerus(gunnerus_log: Path) -> None:
@@ -71,7 +75,6 @@ def test_gunnerus(gunnerus_log: Path) -> None:
     findings = {finding.kind: finding for finding in proposal.findings}
     assert set(findings) == {
         "interpolation across 360",
-        "interpolated from a slower log",
         "position jumps",
         "heading offset",
     }

@@ -92,16 +92,6 @@ def test_the_sign_of_a_rudder_that_moves_nothing_is_not_known() -> None:
     assert "its sign is not known" in column.evidence
 
 
-@pytest.mark.parametrize("word", ["Azimuth", "Rudder"])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_angles_of_two_sides_that_count_to_opposite_sides_are_asked(word: str, sign: int) -> None:
-    names = f"{word} port [deg]", f"{word} stbd [deg]"
-    state = chosen({names[0]: RUDDER, names[1]: sign * RUDDER})
-    asked = [one.sentence for one in state.questions if "opposite sides" in one.sentence]
-    assert len(asked) == (sign < 0)
-    assert all(repr(name) in sentence for sentence in asked for name in names)
-
-
 def test_the_measured_angle_is_taken_rather_than_the_order() -> None:
     state = chosen({"rudder order": RUDDER, "rudder angle": RUDDER})
     assert described(state)["rudder.delta"][0] == "rudder angle"

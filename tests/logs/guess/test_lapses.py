@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import read_mapping
-from tests.logs.simulated import globe, guess_of, import_draft, si_log
+from tests.drawn import seeds
+from tests.logs.simulated import as_bridge, globe, guess_of, import_draft, si_log
 
 
 def test_lapses_of_commands_are_drafted_and_mended(tmp_path: Path) -> None:
@@ -41,7 +43,7 @@ def test_what_may_be_an_order_is_asked_and_stays_as_it_is(tmp_path: Path) -> Non
     proposal = guess_of(tmp_path, frame)
     (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
     assert found.columns == ("rpm",)
-    words = "Was that ordered? Unless it was ordered, switch the repair on"
+    words = "Was that ordered? Unless it was so, switch the repair on"
     asked = [one.sentence for one in proposal.questions if words in one.sentence]
     assert len(asked) == 1
     assert "'rpm' is 0 in 9 rows at 3 places" in asked[0]
@@ -61,4 +63,29 @@ def test_lapses_in_files_of_a_folder_are_asked(tmp_path: Path) -> None:
     (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
     (asked,) = (one for one in proposal.questions if "'rpm' is 0" in one.sentence)
     assert found.repair is None
-    assert asked.sentence.endswith("Unless it was ordered, leave these cells empty, and draft again")
+    assert asked.sentence.endswith("Unless it was so, leave these cells empty, and draft again")
+
+
+def turning_log(seed: int) -> pd.DataFrame:
+    """A log with heading, yaw rate, speed and course over ground, from the begin of its circles on."""
+    log = si_log(seed)
+    course = np.degrees(log["psi"] + np.arctan2(log["v"], log["u"])) % 360.0
+    frame = as_bridge(log).drop(columns=["u", "v"]).rename(columns={"psi": "Heading"})
+    return frame.assign(SOG=np.hypot(log["u"], log["v"]).round(3), COG=course.round(1))
+
+
+@pytest.mark.parametrize("name", ["Heading", "r", "COG"])
+@pytest.mark.parametrize("seed", seeds(1, 6))
+def test_a_sensor_that_is_stuck_in_a_turn_is_broken_out(name: str, seed: int, tmp_path: Path) -> None:
+    """For 5 to 15 % of the log, from the begin of a circle; a short repetition is none."""
+    random, frame = np.random.default_rng(seed), turning_log(seed)
+    first = 822 + int(random.integers(0, 6))
+    for rows, found in ((int(random.uniform(0.05, 0.15) * len(frame)), 1), (6, 0)):
+        stuck = frame.copy()
+        stuck.loc[first : first + rows, name] = frame.loc[first, name]
+        seen = [one for one in guess_of(tmp_path, stuck).findings if one.kind == "frozen sensor"]
+        assert [one.columns for one in seen] == [(name,)] * found
+        for one in seen:
+            assert one.repair is not None
+            (interval,) = one.repair["intervals"]
+            assert interval == pytest.approx(frame["time"].iloc[[first, first + rows + 1]].to_list(), abs=1.1)
