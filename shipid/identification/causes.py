@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,8 +69,8 @@ class Cause:
         for each entry of the size; empty for a cause without a size. unit : of the size.
     least : a smaller size is what any log has. ratio : whether the size is the logarithm of a factor.
     scaled : residuals 0 to 5 (u, v, r, heading, along, across) that shrink with a factor of the size.
-    repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse, {degrees0} for the
-        negative in degrees.
+    repair : text with {0}, {1} for the size, {minus0} and {over0} for its negative and inverse, {offset0} for the
+        offset of a column. offset : the SI value of 1 of its unit, and the offset that the mapping has.
     equals : keys of its class. tells : the run that tells them apart. starts : sizes from which the fit may begin.
     cost : added to the misfit: for free signs, or for one column alone of an instrument that gives two.
     of_runs : whether each run has a size of its own.
@@ -82,6 +84,7 @@ class Cause:
     ratio: bool = False
     scaled: tuple[int, ...] = ()
     repair: str = ""
+    offset: tuple[float, float] = (1.0, 0.0)
     equals: tuple[str, ...] = ()
     tells: str = ""
     starts: tuple[float, ...] = ()
@@ -108,25 +111,46 @@ class Cause:
 
     def repair_text(self, theta: Array) -> str:
         """The repair with the size in it."""
-        sizes = self.sizes(theta)
+        sizes, (unit, there) = self.sizes(theta), self.offset
         words = {
             f"{name}{i}": f"{value:.4g}"
             for i, size in enumerate(sizes)
-            for name, value in (("minus", -size), ("degrees", -np.degrees(size)), ("over", 1 / (size or np.inf)))
+            for name, value in (("minus", -size), ("over", 1 / (size or np.inf)), ("offset", there - size / unit))
         }
         return self.repair.format(*(f"{size:.4g}" for size in sizes), **words)
 
 
-def list_causes(vessel: Vessel | None, commands: Sequence[str], motion: Motion, scales: Scales) -> list[Cause]:
-    """All causes that a vessel and a log can have."""
+def list_causes(
+    vessel: Vessel | None,
+    commands: Sequence[str],
+    motion: Motion,
+    scales: Scales,
+    mapped: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+) -> list[Cause]:
+    """All causes that a vessel and a log can have.
+
+    mapped : `unit`, its `size` in SI and `offset` of each column in the mapping of the log.
+    """
     moving = [name for name in commands if np.ptp(motion.columns[name]) > 0]
-    return [
+    causes = [
         *(cause for name in moving for cause in _command_causes(name, motion.columns[name], scales)),
         *_exchanged_thrusters(commands, motion),
         *_sensor_causes(scales),
         *_water_causes(motion, scales),
         *(() if vessel is None else _coefficient_causes(vessel)),
     ]
+    return [_with_offset(one, mapped) for one in causes]
+
+
+def _with_offset(cause: Cause, mapped: Mapping[str, Mapping[str, Any]]) -> Cause:
+    """A cause that subtracts from a column, with the offset that repairs it; of a column without a mapping in SI."""
+    if not isinstance(cause.change, partial) or cause.change.func is not _subtract:
+        return cause
+    name = cause.change.args[0]
+    known, title = mapped.get(name), f'[columns."{name}"]' if "." in name else f"[columns.{name}]"
+    unit, there = (1.0, 0.0) if known is None else (known["size"], known["offset"])
+    words = f"{cause.unit}, added to what is there" if known is None else known["unit"]
+    return replace(cause, repair=f"{title}\noffset = {{offset0}}  # {words}", offset=(unit, there))
 
 
 def _subtract(name: str, motion: Motion, size: Array) -> Motion:
@@ -211,22 +235,12 @@ def _scale_numbers(where: NDArray[np.bool_], motion: Motion, size: Array) -> Mot
     return replace(motion, parameters=np.where(where, motion.parameters * np.exp(size[0]), motion.parameters))
 
 
-def _offset_repair(column: str, unit: str) -> str:
-    """Lines of a mapping, whose offset is in the unit of its column: in SI, with degrees of an angle beside it."""
-    return (
-        f"[columns.{column}]\noffset = {{minus0}}  # {unit}"
-        + f" or {{degrees0}} {unit.replace('rad', 'deg')}" * ("rad" in unit)
-        + ": as is its unit; added to what is there"
-    )
-
-
 def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]:
     size, angle, key = float(np.sqrt(np.mean(values**2))), is_steering(name), f"command {name}"
     column, unit = f'[columns."{name}"]\n', "rad" if angle else "rev/s" if is_shaft(name) else ""
     strength = ("coefficient rudder",) if angle else (f"{key} zero", "coefficient thrust", "coefficient damping")
     yield Cause(
         f"{key} zero", partial(_subtract, name), (0.05 * size,), unit, 0.003 if angle else 0.01 * size,
-        repair=_offset_repair(f'"{name}"', unit),
         equals=("asymmetry of hull or screw",) if angle else (f"{key} scale", *strength[1:]),
         tells="the angle read on a slip, and a run at another speed" if angle else SPEEDS,
     )  # fmt: skip
@@ -274,7 +288,6 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
     for name, equals in bias.items():
         yield Cause(
             f"sensor {name} bias", partial(_subtract, name), (0.02 * size[name],), unit[name], 0.003 * size[name],
-            repair=_offset_repair(name, unit[name]),
             equals=equals, tells=f"{COURSES} and at several speeds",
         )  # fmt: skip
     yield Cause(
@@ -357,9 +370,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
             "wind scale", partial(_divide, ["V_w"]), (0.05,), "1", 0.05, ratio=True, equals=("coefficient wind",),
             repair="[columns.V_w]\nfactor = {over0}  # times what is there", tells="the wind read at rest",
         )  # fmt: skip
-        yield Cause(
-            "wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05, repair=_offset_repair("beta_w", "rad")
-        )
+        yield Cause("wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05)
 
 
 def _coefficient_causes(vessel: Vessel) -> Iterator[Cause]:

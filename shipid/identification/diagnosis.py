@@ -176,6 +176,7 @@ class _Log:
     numbers: tuple[float, ...] = ()
 
     def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
+        self.mapped = (dataset.metadata.get("mapping") or {}).get("columns", {})
         stretches = [(run, rows) for run, rows in stretch_columns(dataset) if run in runs]
         every = {name: np.concatenate([rows[name] for _, rows in stretches]) for name in ("u", "v", "r")}
         speed = float(np.sqrt(np.mean(every["u"] ** 2 + every["v"] ** 2)))
@@ -206,7 +207,11 @@ class _Log:
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log."""
-        return [one for one in list_causes(None, (), self.motion, self.scales) if not one.key.startswith("current")]
+        return [
+            one
+            for one in list_causes(None, (), self.motion, self.scales, self.mapped)
+            if not one.key.startswith("current")
+        ]
 
     def forces(self, motion: Motion) -> Array:
         """Mean accelerations (3, W) over the bumps, such as they are: no physics says others."""
@@ -457,7 +462,10 @@ class _VesselLog(_Log):
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log or with the vessel."""
-        return [*list_causes(self.vessel, self.commands, self.motion, self.scales), *_unsigned_shafts(self)]
+        return [
+            *list_causes(self.vessel, self.commands, self.motion, self.scales, self.mapped),
+            *_unsigned_shafts(self),
+        ]
 
     def memory(self, motion: Motion) -> Array:
         """Actuator states (M, N) that the orders of a log reach: other changes of the log leave those that are kept."""

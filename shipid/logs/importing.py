@@ -134,10 +134,14 @@ def import_log(
         raise DataError("has changed while it was read: import it again when nothing writes to it", file=source)
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows, repairs = parts[0].rows, _add_records([part.records for part in parts])
+    written = {
+        name: {"unit": column.unit, "size": to_si(column.unit, name), "offset": column.offset}
+        for name, column in mapping.columns.items()
+    }
     metadata = {
         "vessel": mapping.vessel,
         "source": {**mapping.source.model_dump(exclude_defaults=True), "log": source.name, "sha256": digest},
-        "mapping": {"name": mapping.name, "digest": mapping.digest},
+        "mapping": {"name": mapping.name, "digest": mapping.digest, "columns": written},
         "rows": sum(part.read for part in parts),
         "clock": "run" if alone else "shared",
         "units": units_of_columns(rows.columns),

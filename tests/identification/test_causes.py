@@ -9,6 +9,7 @@ from shipid.identification.causes import Cause, Motion, Scales, list_causes
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 
+SCALES = Scales(30.0, 5.0, 1.0)
 SHIPS = ("gunnerus-33.9", "mariner", "otter")
 
 
@@ -19,7 +20,7 @@ def motion_of(ship: str) -> tuple[Motion, list[Cause]]:
     names = ["north", "east", "psi", "u", "v", "r", *model.commands, "V_w", "beta_w", "V_c", "beta_c"]
     columns = {name: random.normal(size=60) for name in names}
     motion = Motion(columns, np.array([*vessel.parameters.values()]), (slice(0, 30), slice(30, 60)), (0, 1), 0.5)
-    return motion, list_causes(vessel, model.commands, motion, Scales(30.0, 5.0, 1.0))
+    return motion, list_causes(vessel, model.commands, motion, SCALES)
 
 
 @pytest.mark.parametrize("ship", SHIPS)
@@ -50,7 +51,15 @@ def test_a_trial_step_is_felt_and_a_repair_holds_its_numbers(ship: str) -> None:
         moved = [name for name, values in motion.columns.items() if not np.array_equal(after.columns[name], values)]
         assert moved or after.course or not np.array_equal(after.parameters, motion.parameters), cause.key
         assert "{" not in (text := cause.repair_text(np.array(cause.trial))), cause.key
-        assert "# rad" not in text or f"{-np.degrees(cause.trial[0]):.4g} deg" in text, cause.key
+        if "offset" in text and "[[repair]]" not in text:
+            assert f"offset = {-cause.trial[0]:.4g}  # {cause.unit}, added to what is there" in text, cause.key
+
+
+def test_an_offset_is_that_of_the_mapping_in_the_unit_of_its_column() -> None:
+    vessel, (motion, _) = load_vessel("gunnerus-33.9"), motion_of("gunnerus-33.9")
+    mapped = {"psi": {"unit": "deg", "size": np.pi / 180, "offset": 90.0}}
+    (cause,) = (one for one in list_causes(vessel, (), motion, SCALES, mapped) if one.key == "sensor psi bias")
+    assert cause.repair_text(np.radians([2.5])) == "[columns.psi]\noffset = 87.5  # deg"
 
 
 def test_a_delay_is_undone_within_each_stretch() -> None:
