@@ -1,12 +1,14 @@
 """From results to words: the answer in sentences, each with the anchor of the figure or table that carries it.
 
 "Best" is always the model that validation prefers at the largest amount of data, never the lowest error on the test.
+The first sentence names the best of all that a reader could use: physics, no physics, or the regression.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -21,7 +23,7 @@ from shipid.answer.verdict import (
     too_few_manoeuvres,
 )
 from shipid.evidence import SIGNIFICANT, Differences, log_error, paired_difference
-from shipid.metrics import error_of_windows
+from shipid.metrics import error_of_windows, position_error, summarise_errors
 from shipid.report.wording import REGRESSION, counted_text, join_few_names, metres_text
 from shipid.study.cells import EQUAL_WEIGHTS
 from shipid.study.declared import NO_MODEL
@@ -71,6 +73,18 @@ class AnswerCase:
     table: ErrorTable
     at_horizon: ErrorTable
     best: str | None
+
+    @cached_property
+    def leader(self) -> str | None:
+        """The best of the best physics model, no physics and the regression by validation loss with the most runs."""
+        largest, plan, losses = self.table.amounts[-1], self.results.plan, self.results.regression_loss
+        top = self.rows[self.rows["N_D"] == largest].set_index("model")["loss"]
+        known = {name: float(top[name]) for name in (self.best, NO_MODEL) if name in top}
+        of_batches = [losses.get(batch.key, np.nan) for batch in plan.batches if largest == batch.N_D]
+        known |= {REGRESSION: float(np.mean(of_batches))} if REGRESSION in self.table.H else {}
+        first = self.best if plan.families else NO_MODEL
+        ended = {name: loss for name, loss in known.items() if np.isfinite(loss)}
+        return min(ended, key=ended.__getitem__) if first in ended else first
 
     @property
     def ends(self) -> dict[int, int]:
@@ -299,27 +313,33 @@ def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
     elif estimate.below:
         do = plural_word(fewest, "does", "do")
         text = f"Without physics the same {runs} {do} as well{bounds}. H is then {case.error(NO_MODEL, fewest)}"
-    yield f"How many runs? With {runs}, H of {best} ({BEST}) is {case.error(best, fewest)}. {text}."
+    called = f" ({BEST})" * (best == case.leader)
+    yield f"How many runs? With {runs}, H of {best}{called} is {case.error(best, fewest)}. {text}."
 
 
 def _headline(case: AnswerCase) -> Iterator[str]:
     """Error at the horizon of the best model at the largest amount of data; of all where none is known as best."""
     best, largest = case.best, case.table.amounts[-1]
     rows, runs = case.rows[case.rows["N_D"] == largest].set_index("model"), counted_text(largest, "run")
-    if best is None and not case.results.plan.families:
-        error, most = case.error(NO_MODEL, largest, "H_end"), metres_text(float(rows["H_end_90"][NO_MODEL]))
-        yield f"{case.ahead} ahead, data alone with {runs} err by {error} on average, nine in ten below {most}."
-        return
-    if best is None:
+    leader, plan, of_others = str(case.leader), case.results.plan, list[str]()
+    if case.leader is None:
         yield f"With {runs}, no model is {BEST}. {_mean_errors(case.results, rows['H_end'])}"
         return
-    without = f" Without physics: {case.rival(NO_MODEL, best, largest, 'H_end')}." if NO_MODEL in rows.index else ""
+    for name, text in ((best, f"With physics ({best})"), (NO_MODEL, "Without physics")):
+        if name != leader and name in rows.index:
+            of_others.append(f" {text}: {case.rival(str(name), leader, largest, 'H_end')}.")
     place, table = case.ends[largest], case.at_horizon
-    if {REGRESSION, best} <= set(table.H) and table.mean(REGRESSION, place) < table.mean(best, place):
-        without += f" A regression without physics errs by less: {case.rival(REGRESSION, best, largest, 'H_end')}."
+    if leader == REGRESSION:
+        paths = [case.results.regression[batch.key] for batch in plan.batches if largest == batch.N_D]
+        most = float(np.mean([summarise_errors(position_error(p, case.results.test.future))["end_90"] for p in paths]))
+    else:
+        most = float(rows["H_end_90"][leader])
+        if {REGRESSION, leader} <= set(table.H) and table.mean(REGRESSION, place) < table.mean(leader, place):
+            of_others.append(f" A regression errs by less: {case.rival(REGRESSION, leader, largest, 'H_end')}.")
+    names = {NO_MODEL: "no physics" if plan.families else "data alone", REGRESSION: "a regression without physics"}
     yield (
-        f"{case.ahead} ahead, {best} ({BEST}) with {runs} errs by {case.error(best, largest, 'H_end')} on average, "
-        f"nine in ten below {metres_text(float(rows['H_end_90'][best]))}.{without}"
+        f"{case.ahead} ahead, {names.get(leader, leader)} ({BEST}) with {runs} errs by "
+        f"{case.error(leader, largest, 'H_end')} on average, nine in ten below {metres_text(most)}.{''.join(of_others)}"
     )
 
 

@@ -50,6 +50,7 @@ from shipid.hybrid.features import count_steps
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics, check_columns, missing_columns
 from shipid.hybrid.regression import Regression
+from shipid.hybrid.search import best_trials
 from shipid.hybrid.simulated import SimulatedPhysics, Simulator
 from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
@@ -554,12 +555,12 @@ def states_along(vessel: Vessel, commands: Sequence[str], rows: pd.DataFrame) ->
     return memory_along(vessel, {name: rows[name].to_numpy() for name in commands}, rows["t"].to_numpy())
 
 
-def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> dict[str, Array]:
-    """Paths (T, S, 2) [m] on the test windows by `Regression` on the runs of each batch, by its key.
+def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> tuple[dict[str, Array], dict[str, float]]:
+    """Paths (T, S, 2) [m] on the test windows by `Regression` on the runs of each batch, by its key, and losses [m^2].
 
     A batch whose runs do not suffice for one is left out.
     """
-    study, paths, method = prepared.study, dict[str, Array](), Regression()
+    study, paths, losses, method = prepared.study, dict[str, Array](), dict[str, float](), Regression()
     physics, known = physics_of(study, None), study.prediction.known
     test = prepared.test.instants(known=known)
     for batch in batches:
@@ -570,7 +571,8 @@ def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> dict[
             fitted = method.fit(Task(cases, windows, folds, prepared.commands, known, batch.seed))[batch.key]
             if fitted.corrector is not None:
                 paths[batch.key] = fitted.corrector.predict(physics, test, np.empty(0))
-    return paths
+                losses[batch.key] = best_trials(fitted.trials)[0]["value"]
+    return paths, losses
 
 
 def foundation_record(foundation: Foundation) -> dict[str, Any]:

@@ -46,7 +46,8 @@ class Results(NotebookView, shown=("plan.name", "folder", "missing", "table")):
     """A run's folder, read: the plan, one row per cell, models, test windows, and the predictions of every cell.
 
     naive : errors (T, S) [m] of constant u, v, r. physics : model -> path (T, S, 2) [m] of the physics alone.
-    regression : key of a batch -> path (T, S, 2) [m] of a regression on its runs.
+    regression, regression_loss : key of a batch -> path (T, S, 2) [m] of a regression on its runs, and its mean squared
+        error [m^2] on runs left out.
     paths : cell -> predicted path (T, S, 2) [m] in the frame (11). bands : cell -> its bands, where it has any;
     no_band : cell -> why it has none of the level of the study.
     """
@@ -64,6 +65,7 @@ class Results(NotebookView, shown=("plan.name", "folder", "missing", "table")):
     bands: Mapping[str, Bands] = field(default_factory=dict)
     no_band: Mapping[str, str] = field(default_factory=dict)
     regression: Mapping[str, np.ndarray] = field(default_factory=dict)
+    regression_loss: Mapping[str, float] = field(default_factory=dict)
 
     def table(self) -> pd.DataFrame:
         """H [m] of each model, the mean over methods and seeds, at each N_D."""
@@ -175,7 +177,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check_seals(folder)
     cells = _read_part_cells(folder, plan)
-    test, physics, naive, regression = store.read_test(folder)
+    test, physics, naive, regression, losses = store.read_test(folder)
     bands: dict[str, Bands] = {}
     no_band: dict[str, str] = {}
     good = [str(cell) for cell in cells["cell"][cells["status"] == "ok"]]
@@ -203,6 +205,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         bands=bands,
         no_band=no_band,
         regression=regression,
+        regression_loss=losses,
     )
 
 

@@ -231,7 +231,7 @@ def _check_common(folder: Path, prepared: PreparedStudy) -> None:
 def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy) -> None:
     """Store what no unit computes, so that a report needs nothing else."""
     test, paths = prepared.test, _paths_alone(prepared)
-    store.write_test(folder, test, paths, prepared.naive, regression_paths(prepared, plan.batches))
+    store.write_test(folder, test, paths, prepared.naive, *regression_paths(prepared, plan.batches))
     rows = input_envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
     known = {

@@ -382,18 +382,21 @@ def write_test(
     paths: Mapping[str, np.ndarray],
     naive: np.ndarray,
     regression: Mapping[str, np.ndarray],
+    losses: Mapping[str, float],
 ) -> None:
-    """Store the test windows, the physics paths of every foundation on them and those of the regressions by batch."""
+    """Store the test windows, physics paths of every foundation on them; paths and losses of regressions by batch."""
     arrays: dict[str, np.ndarray] = {"run": test.run, "t": test.t, "future": test.future, "naive": naive}
     columns = {one: getattr(test, field) for field, one in PREFIXES.items()}
-    for prefix, named in {**columns, "physics ": paths, "regression ": regression}.items():
-        arrays |= {f"{prefix}{name}": values for name, values in named.items()}
+    for prefix, named in {**columns, "physics ": paths, "regression ": regression, "loss ": losses}.items():
+        arrays |= {f"{prefix}{name}": np.asarray(values) for name, values in named.items()}
     arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
     write_arrays(folder / TEST, arrays, compressed=True)
 
 
-def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray, dict[str, np.ndarray]]:
-    """Test windows, physics paths by foundation, errors (T, S) of constant u, v, r, paths of regressions by batch."""
+def read_test(
+    folder: Path,
+) -> tuple[Windows, dict[str, np.ndarray], np.ndarray, dict[str, np.ndarray], dict[str, float]]:
+    """Test windows, physics paths by foundation, errors (T, S) of constant u, v, r; paths and losses of regressions."""
     try:
         arrays = read_arrays(folder / TEST)
         meta = json.loads(str(arrays["meta"]))
@@ -410,8 +413,8 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray,
         shared_clock=meta["shared"],
         **named,
     )
-    physics, regression = (arrays_with_prefix(arrays, prefix) for prefix in ("physics ", "regression "))
-    return windows, physics, arrays["naive"], regression
+    physics, regression, losses = (arrays_with_prefix(arrays, one) for one in ("physics ", "regression ", "loss "))
+    return windows, physics, arrays["naive"], regression, {key: float(value) for key, value in losses.items()}
 
 
 def check_shard(shard: tuple[int, int]) -> tuple[int, int]:

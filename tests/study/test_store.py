@@ -136,9 +136,9 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
 
 
 def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path) -> None:
-    windows, paths, naive, regression = store.read_test(tiny_run)
-    store.write_test(tmp_path, windows, paths, naive, regression)
-    again, others, floor, regressed = store.read_test(tmp_path)
+    windows, paths, naive, regression, losses = store.read_test(tiny_run)
+    store.write_test(tmp_path, windows, paths, naive, regression, losses)
+    again, others, floor, regressed, lost = store.read_test(tmp_path)
     assert {key: path.tolist() for key, path in regressed.items()} == {k: p.tolist() for k, p in regression.items()}
     np.testing.assert_array_equal(again.future, windows.future)
     np.testing.assert_array_equal(floor, naive)
