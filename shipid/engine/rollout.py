@@ -224,10 +224,10 @@ def rates_of_change(
     )
     job = RolloutJob(1.0, 1, "euler", 1, channel_places(keep, channel_names(model), vessel))
     with np.errstate(all="ignore"):
-        before, after = run_with_fallback(
+        both = run_with_fallback(
             None, lambda: choose_engine(batch, job, repeated=True), lambda way: way.run(model, batch, job)[0][:, 0]
         )
-        return np.asarray((after - before).T)
+        return np.asarray(np.diff(both, axis=0)[0].T)
 
 
 def prepare_batch(

@@ -54,9 +54,8 @@ def mirrored_sides(values: Array, reflection: Array | None) -> Array:
 
 def kernel_values(points: Any, centres: Any, linear: Any, maths: Any = np) -> Any:
     """exp(-|z - c|^2 / 2) + l (1 + z c) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales."""
-    values = bell_values(points, centres, maths)
-    values += (linear * with_constant(points, maths)) @ with_constant(centres, maths).T
-    return values
+    plane = (linear * with_constant(points, maths)) @ with_constant(centres, maths).T
+    return plane + bell_values(points, centres, maths)
 
 
 def weighed_kernels(sides: Any, centres: Any, linear: Any, weights: Any, maths: Any = np) -> Any:

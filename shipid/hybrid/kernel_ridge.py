@@ -49,10 +49,9 @@ class KernelProblem(PathProblem):
         self.varying = VaryingInputs.of(self.rows(self.windows), method.mirror)
         self.scales = [f"{kernel_group(name)}_scale" for name in self.varying.normaliser.names]
         values, reflection = self.varying.normaliser.apply(self.table), self.varying.reflection
-        self.values, self.outputs = self._tensor(values), self._tensor(self.weights.T)  # (S, d), (2, S, r)
-        self.sides = self._tensor(mirrored_sides(values, reflection))  # (K, S, d)
-        if reflection is None:
-            self.outputs = torch.cat([*self.outputs], dim=1)[None]
+        self.values, self.sides = self._tensor(values), self._tensor(mirrored_sides(values, reflection))  # (K, S, d)
+        apart = self.weights.T.reshape(len(self.sides), -1, *self.weights.T.shape[1:])  # x and y, or both together
+        self.outputs = self._tensor(np.concatenate([*apart.swapaxes(0, 1)], axis=2))  # (K, S, R)
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
         self.parts = min(method.trials, len(task.folds))
         self.few = self.parts > 1 and len(task.folds) < FOLDS_OF_PART * method.trials
@@ -121,21 +120,18 @@ class KernelProblem(PathProblem):
         Centres that any fold leaves out come last in the Cholesky factor, [[L, 0], [A, B]]: the last block of G is then
         the inverse of B B^T, and what is above it is -L^-T A^T times that.
         """
-        outs = np.array(
-            [np.zeros(len(self.part), dtype=bool), *(~np.isin(self.part, training) for training, _ in folds)]
-        )
+        outs = np.array([~np.isin(self.part, kept) for kept in (self.part, *(training for training, _ in folds))])
         order, first = np.argsort(outs.any(axis=0), kind="stable"), int((~outs.any(axis=0)).sum())
         part = self.part[order]
         kernel = self.kernels(part, part, settings)
         kernel.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
         factor = torch.linalg.cholesky(kernel)
         weights = torch.cholesky_solve(self.outputs[:, part], factor)
-        top, across, inverse = factor[:, :first, :first], factor[:, first:, :first], factor[:, first:, first:]
-        inverse, last = torch.cholesky_inverse(inverse), weights[:, first:]
+        inverse, last = torch.cholesky_inverse(factor[:, first:, first:]), weights[:, first:]
         places = map(np.flatnonzero, outs[:, order[first:]])
         parts = [inverse[:, :, b] @ torch.linalg.solve(inverse[:, b][:, :, b], last[:, b]) for b in places]
-        below = torch.cat(parts, dim=2)
-        above = torch.linalg.solve_triangular(top.mT, across.mT @ below, upper=True)
+        below, left = torch.cat(parts, dim=2), factor[:, :, :first].mT  # L^T beside A^T
+        above = torch.linalg.solve_triangular(left[:, :, :first], left[:, :, first:] @ below, upper=True)
         changes = torch.cat([-above, below], dim=1).split(weights.shape[2], dim=2)
         return [torch.cat([*(weights - change)[:, np.argsort(order)]], dim=1) for change in changes]
 

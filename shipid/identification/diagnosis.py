@@ -426,7 +426,7 @@ class _Log:
 class _VesselLog(_Log):
     """A log with the vessel that should have made it."""
 
-    _kept: tuple[Array, Array] | None = None
+    _kept: Array | None = None
 
     def __init__(
         self,
@@ -447,8 +447,8 @@ class _VesselLog(_Log):
         super().__init__(dataset, runs)
 
     def repair(self, motion: Motion) -> None:
-        """Take another motion for the log, whose actuators and forces are kept."""
-        self._kept = self.memory(motion), self.forces(motion)
+        """Take another motion for the log, whose actuators are kept."""
+        self._kept = self.memory(motion)
         super().repair(motion)
 
     def causes(self) -> list[Cause]:
@@ -459,7 +459,7 @@ class _VesselLog(_Log):
         """Actuator states (M, N) that the orders of a log reach: other changes of the log leave those that are kept."""
         names, columns = self.model.memory, motion.columns
         if self._kept is not None and all(columns[name] is self.motion.columns[name] for name in names):
-            return self._kept[0]
+            return self._kept
         start, stop = np.transpose([(part.start, part.stop) for part in motion.stretches])
         steps = np.arange((stop - start).max())
         rows, inside = np.minimum(start + steps[:, None], stop - 1), steps < (stop - start)[:, None]
@@ -467,12 +467,7 @@ class _VesselLog(_Log):
         return np.reshape([one.T[inside] for one in reached.values()], (len(names), len(columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
-        """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
-        turned = any(motion.columns[name].any() for name in self.environment)
-        names = ["u", "v", "r", *self.commands, *self.environment, *["psi"] * turned]
-        same = all(motion.columns[name] is self.motion.columns[name] for name in names)
-        if self._kept is not None and same and motion.parameters is self.motion.parameters:
-            return self._kept[1]
+        """Mean accelerations (3, W) over the bumps by the physics."""
         return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY]))
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
