@@ -55,11 +55,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -69,14 +70,15 @@ from scipy.special import exprel, ndtri
 
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
-from shipid.engine.casadi import memory_along
-from shipid.engine.rollout import rates_of_change, rollout_distances
+from shipid.engine.casadi import input_symbols, memory_along, summed_rates
+from shipid.engine.rollout import rollout_distances
+from shipid.engine.samples import map_over_samples
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes, multiply_signs, rotate_heading
 from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
-from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Steps = NDArray[np.integer[Any]]
@@ -472,40 +474,31 @@ class _VesselLog(_Log):
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
-        return self._rates(motion, *self._inputs(motion, at, at))
+        return _mapped_rates(self.model)(*self._inputs(motion, at), motion.parameters)[0]
 
-    def _rates(self, motion: Motion, *inputs: Mapping[str, Array]) -> Array:
-        return rates_of_change(self.vessel, *inputs, parameters=motion.parameters[None], keep=("u", "v", "r"))
-
-    def _inputs(self, motion: Motion, at: Steps, during: Steps) -> list[dict[str, Array]]:
-        """Named states at n steps, commands and environment during others, and actuators at the n steps.
-
-        States that no column has are 0.
-        """
-        columns, still = self.states(motion), np.zeros(len(at))
-        names = {name: state_column(name) for name in (*self.model.state, *self.model.hidden)}
-        return [
-            {name: columns[column][at] if column in columns else still for name, column in names.items()},
-            {name: columns[name][during] for name in self.commands},
-            {name: columns[name][during] for name in self.environment},
-            dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
-        ]
+    def _inputs(self, motion: Motion, at: Steps) -> list[Array]:
+        """States, actuators, commands and environment, each (., n), at n steps."""
+        columns = self.states(motion)
+        given = (
+            np.array([columns[name][at] for name in names]).reshape(-1, len(at))
+            for names in (self.commands, self.environment)
+        )
+        return [self._start(columns, at), self.memory(motion)[:, at], *given]
 
     def _with_drift(self, motion: Motion) -> Motion:
         """The log with its heading, where that is a course: sway is that of the physics, from a while before on."""
         if not motion.course:
             return motion
         speed = np.hypot(motion.columns["u"], motion.columns["v"])
-        sway = np.zeros(len(speed))
-        inputs = self._inputs(motion, np.arange(len(sway)), np.arange(len(sway)))
+        sway, row = np.zeros(len(speed)), self.model.state.index("v")
+        states, *inputs = self._inputs(motion, np.arange(len(sway)))
         parts = [(at, p.start, p.stop - 1) for p in motion.stretches for at in range(p.start, p.stop, SHORTEST)]
         start, first, last = np.transpose(parts)
-        v = np.zeros(len(start))
+        v, rates = np.zeros(len(start)), _mapped_rates(self.model)
         for k in range(-SHORTEST, SHORTEST):
             at = np.clip(start + k, first, last)
-            sway[at] = v = np.clip(v, -speed[at], speed[at])
-            states, *others = ({name: values[at] for name, values in one.items()} for one in inputs)
-            v = v + motion.step * self._rates(motion, states | {"v": v}, *others)[1]
+            sway[at] = states[row, at] = v = np.clip(v, -speed[at], speed[at])
+            v = v + motion.step * rates(states[:, at], *(one[:, at] for one in inputs), motion.parameters)[0][1]
         drift = np.arcsin(sway / np.maximum(speed, 1e-12)) * np.sign(motion.columns["u"])
         return rotate_heading(replace(motion, course=False), [drift])
 
@@ -513,19 +506,26 @@ class _VesselLog(_Log):
         """Residuals (6, W): measured change less predicted change, a unit of time."""
         return super().residuals(self._with_drift(motion))
 
+    def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
+        """States (., n) at n steps; those that no column has are 0."""
+        names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
+        return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
+
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
         motion = self._with_drift(motion)
-        columns, rows = motion.columns, self.paths + np.arange(self.ahead + 1)[:, None]
-        *inputs, memory = self._inputs(motion, self.paths, rows[:-1])
+        columns, at = self.states(motion), self.paths
+        rows = at + np.arange(self.ahead + 1)[:, None]
         found = rollout_distances(
             self.vessel,
-            *inputs,
+            dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
+            {name: columns[name][rows[:-1]] for name in self.commands},
+            {name: columns[name][rows[:-1]] for name in self.environment},
             np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1),
             step=self.step,
             method="rk4",
             parameters=motion.parameters[None],
-            memory=memory,
+            memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
         )
         far = LOST * self.scales.length
         return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / self.ahead, far)))
@@ -548,6 +548,19 @@ def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
     total = cumulative_integral(t, values)
     low, high = (np.clip(grid + side * step / 2, t[0], t[-1]) for side in (-1, 1))
     return np.asarray((np.interp(high, t, total) - np.interp(low, t, total)) / (high - low))
+
+
+@lru_cache(maxsize=16)
+def _mapped_rates(model: Dynamics) -> Callable[..., list[Array]]:
+    """(state, memory, commands, environment, each (., n), parameters) -> [accelerations (3, n) of u, v, r].
+
+    It is compiled where it can be, as a diagnosis calls it some hundred times.
+    """
+    inputs = input_symbols(model)
+    rates = ca.SX(summed_rates(model, inputs, ca.SX.zeros(model.num_dof), {}))
+    rows = [model.state.index(name) for name in ("u", "v", "r")]
+    function = ca.Function("accelerations", inputs, [rates[rows]], [*INPUTS], ["rates"], {"cse": True})
+    return map_over_samples(function, np.inf, INPUTS[-1:])
 
 
 def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
