@@ -57,9 +57,7 @@ class Journal:
         if cell not in self._studies:
             return []
         study = self._studies[cell]
-        unsaid = (
-            "" if study.trials else self.digest
-        )  # of a study that a process began, and was stopped before its digest
+        unsaid = "" if study.trials else self.digest  # of a study that a process began, and was stopped before its digest
         if self.digest and study.user_attrs.get(DIGEST, unsaid) != self.digest:
             raise ResultError(f"the trials of {cell} are of another study; {REMEDY}", file=self.file)
         rows: list[Row] = []

@@ -21,7 +21,6 @@ from shipid.hybrid.kernel_compensator import (
     KernelMember,
     bell_values,
     kernel_group,
-    kernel_values,
     mirrored_sides,
     weighed_kernels,
     with_constant,
@@ -63,7 +62,8 @@ class KernelProblem(PathProblem):
         """Kernels (K, S, C) between windows, with the settings of a trial: those of x and of y, or one of both."""
         scales = self._tensor([settings[name] for name in self.scales])
         sides, around = self.sides[:, points] / scales, self.values[centres] / scales
-        return mirror_sums(kernel_values(sides, around, settings["linear"], torch))
+        plane = (settings["linear"] * with_constant(sides, torch)) @ with_constant(around, torch).T
+        return mirror_sums(plane + bell_values(sides, around, torch))
 
     def folds_left_out(self, number: int) -> list[tuple[Index, Index]]:
         """Folds that a trial leaves out of its choice of scales."""

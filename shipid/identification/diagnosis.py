@@ -146,17 +146,13 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it.
-
-    residuals : (6, W) of that log.
-    """
+    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it."""
 
     cause: Cause
     theta: Array
     errors: Array
     left_out: Array
     motion: Motion
-    residuals: Array
 
     @property
     def counts(self) -> bool:
@@ -315,8 +311,8 @@ class _Log:
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
         return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
 
-    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: _Fit | None = None) -> _Fit:
-        """Fit a cause by Gauss-Newton from a fit or the start of least misfit; one that lowers nothing stays."""
+    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: Array | None = None) -> _Fit:
+        """Fit a cause by Gauss-Newton from a size or the start of least misfit; one that lowers nothing stays."""
         trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
@@ -328,11 +324,8 @@ class _Log:
                 z[list(cause.scaled)] *= np.exp(max(theta[0], 0.0))  # neither way makes less of an error
             return motion, z
 
-        if begin is None:
-            starts = (np.zeros(len(trials)), *map(np.atleast_1d, cause.starts))
-            theta, motion, z = min(((one, *change(one)) for one in starts), key=lambda one: self.misfit(one[2]))
-        else:
-            theta, motion, z = begin.theta, begin.motion, begin.residuals
+        begins = [np.zeros(len(trials)), *map(np.atleast_1d, cause.starts)] if begin is None else [begin]
+        theta, (motion, z) = min(((one, change(one)) for one in begins), key=lambda one: self.misfit(one[1][1]))
         J, unit = np.zeros((len(theta), *z.shape)), np.eye(len(theta))
         if cause.of_runs:  # a change of all runs at once: none feels the number of another
             unit = np.repeat(np.eye(2), len(theta) // 2, axis=1)
@@ -362,7 +355,7 @@ class _Log:
             if out.any() and not out.all():
                 step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
-        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion, z)
+        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
 
     def beyond_noise(self, errors: Array) -> float:
         """Mean error [m] of paths without what the noise of the log makes of it."""
@@ -464,9 +457,9 @@ class _VesselLog(_Log):
             return self._kept
         start, stop = np.transpose([(part.start, part.stop) for part in motion.stretches])
         steps = np.arange((stop - start).max())
-        rows, inside = np.minimum(start + steps[:, None], stop - 1), steps < (stop - start)[:, None]
+        rows, inside = np.minimum(start[:, None] + steps, stop[:, None] - 1), steps < (stop - start)[:, None]
         reached = memory_along(self.vessel, {name: columns[name][rows] for name in names}, motion.step * steps) or {}
-        return np.reshape([one.T[inside] for one in reached.values()], (len(names), len(columns["u"])))
+        return np.reshape([one[inside] for one in reached.values()], (len(names), len(columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
         """Mean accelerations (3, W) over the bumps by the physics."""
@@ -669,7 +662,7 @@ def _judge(log: _Log, causes: Sequence[Cause], whole: float) -> tuple[Diagnosis,
     base = log.plain_residuals
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
-    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key]) for key in near}
+    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
     rest = min(log.misfit(z) for z in (base, *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
     fits |= {
         key: replace(fit, cause=replace(fit.cause, cost=np.inf))
