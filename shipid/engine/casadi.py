@@ -24,8 +24,8 @@ def call_function(function: ca.Function, *inputs: Array) -> Array:
     (buffer, evaluate), result = function.buffer(), np.empty(function.size_out(0), order="F")
     given = [np.ravel(one, "F") for one in inputs]
     for i, one in enumerate(given):
-        buffer.set_arg(i, memoryview(one))
-    buffer.set_res(0, memoryview(result.T))
+        buffer.set_arg(i, memoryview(one))  # type: ignore[call-arg]  # a view has its size
+    buffer.set_res(0, memoryview(result.T))  # type: ignore[call-arg]
     with hold_interrupts():
         evaluate()
     return result
