@@ -132,7 +132,7 @@ class KernelProblem(PathProblem):
         parts = [inverse[:, :, b] @ torch.linalg.solve(inverse[:, b][:, :, b], last[:, b]) for b in places]
         below, left = torch.cat(parts, dim=2), factor[:, :, :first].mT  # L^T beside A^T
         above = torch.linalg.solve_triangular(left[:, :, :first], left[:, :, first:] @ below, upper=True)
-        changes = torch.cat([-above, below], dim=1).chunk(len(parts), dim=2)
+        changes = torch.chunk(torch.cat([-above, below], dim=1), len(parts), dim=2)
         return [torch.cat([*(weights - change)[:, np.argsort(order)]], dim=1) for change in changes]
 
     def corrector(self, best: Sequence[Row]) -> KernelCompensator:
