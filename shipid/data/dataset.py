@@ -268,11 +268,11 @@ def mean_commands(rows: StretchRows, edges: Array) -> dict[str, Array]:
     within a step counts for the rest of it.
     """
     t, widths = np.asarray(rows["t"]), np.diff(edges, axis=0)
-    at_start, slack = sample_columns(rows, edges[:-1]), clock_slack(t)
+    orders = {name: np.asarray(rows[name], dtype=float) for name in filter(is_command, map(str, rows))}
+    at_start, slack = sample_columns({"t": t, **orders}, edges[:-1]), clock_slack(t)
     later = np.maximum(edges - t[-1], 0.0)
     result: dict[str, Array] = {}
-    for name in filter(is_command, map(str, rows)):
-        values = np.asarray(rows[name], dtype=float)
+    for name, values in orders.items():
         passed = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(t))])
         mean = np.diff(np.interp(edges, t, passed) + values[-1] * later, axis=0) / widths
         most = float(np.abs(np.diff(values)).max(initial=0.0))

@@ -24,8 +24,8 @@ def call_function(function: ca.Function, *inputs: Array) -> Array:
     (buffer, evaluate), result = function.buffer(), np.empty(function.size_out(0), order="F")
     given = [np.ravel(one, "F") for one in inputs]
     for i, one in enumerate(given):
-        buffer.set_arg(i, memoryview(one))
-    buffer.set_res(0, memoryview(result.T))
+        buffer.set_arg(i, memoryview(one))  # type: ignore[call-arg]  # a view has its size
+    buffer.set_res(0, memoryview(result.T))  # type: ignore[call-arg]
     with hold_interrupts():
         evaluate()
     return result
@@ -139,12 +139,11 @@ def _memory_scan(model: Dynamics, num_runs: int) -> tuple[ca.Function, tuple[int
     used = tuple(np.flatnonzero(ca.which_depends(after, parameters, 1, False)).tolist())
     of_memory = [model.commands.index(name) for name in model.memory]
     steps = ca.Function("advance", [memory, order[of_memory], dt, parameters[list(used)]], [after]).mapaccum(UNROLLED)
-    scan = steps.expand().mapaccum(BLOCK // UNROLLED)
-    return scan.map("runs", "serial", num_runs, [2, 3], []), used
+    return steps.expand().mapaccum(BLOCK // UNROLLED).map("runs", "serial", num_runs, [2, 3], []), used
 
 
 def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dict[str, Array] | None:
-    """Hidden actuator states (n,) or (n, R) along the orders of one run or of R at the times t (n,) [s] of all of them.
+    """Hidden actuator states (n,) or (R, n) along the orders of one run or of R at the times t (n,) [s] of all of them.
 
     None if the vessel has none. The states begin at the first order; each order is held until the next row. They are
     simulated, not measured.
@@ -153,18 +152,15 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     if not model.memory:
         return None
     orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.memory])
-    shape, orders = orders.shape, orders.reshape(len(orders), len(t), -1).transpose(0, 2, 1)  # (M, R, n)
+    shape, orders = orders.shape, orders.reshape(len(orders), -1, len(t))
     (scan, used), parts = _memory_scan(model, orders.shape[1]), [orders[:, :, :1]]
     values = np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK))
     dt, count = np.diff(t), len(t) - 1
     held = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1)  # the last block is padded
     for rows in held.reshape(-1, BLOCK):
-        reached = call_function(
-            scan, parts[-1][:, :, -1], orders[:, :, rows].reshape(len(orders), -1), dt[rows], values
-        )
-        parts.append(reached.reshape(len(orders), -1, BLOCK))
-    along = np.concatenate(parts, axis=2)[:, :, : len(t)].transpose(0, 2, 1).reshape(shape)
-    return dict(zip(model.memory, along, strict=True))
+        now = parts[-1][:, :, -1], orders[:, :, rows].reshape(len(orders), -1)
+        parts.append(call_function(scan, *now, dt[rows], values).reshape(len(orders), -1, BLOCK))
+    return dict(zip(model.memory, np.concatenate(parts, axis=2)[:, :, : len(t)].reshape(shape), strict=True))
 
 
 @lru_cache(maxsize=64)

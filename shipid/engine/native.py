@@ -461,12 +461,15 @@ def pad_samples(array: Array, wide: int, precision: Precision = DOUBLE) -> Array
     return np.ascontiguousarray(filled, dtype=precision.dtype)
 
 
-def _pack_groups(array: Array, lanes: int, precision: Precision) -> Array:
-    """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
-    count, entries, num_samples = array.shape
-    groups = -(-num_samples // lanes)
-    filled = pad_samples(array, groups * lanes, precision).reshape(count, entries, groups, lanes)
-    return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
+def pack_lanes(array: Array, precision: Precision = DOUBLE) -> Array:
+    """Group samples by SIMD lanes: (S, ..., entries) -> (groups, ..., entries, lanes); the last one is repeated.
+
+    What one group reads at every step lies together.
+    """
+    lanes = compiler_target(precision).lanes
+    filled = np.concatenate([array, np.repeat(array[-1:], -len(array) % lanes, axis=0)])
+    groups = filled.reshape(-1, lanes, *array.shape[1:])
+    return np.ascontiguousarray(np.moveaxis(groups, 1, -1), dtype=precision.dtype)
 
 
 def run_native(
@@ -499,7 +502,7 @@ def measure_native(
     num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), padded_width(batch, precision)
     sums, worst = (np.empty((num_variants, wide), precision.dtype) for _ in range(2))
     tally = np.zeros((num_variants, count_parts(batch, precision), BINS), dtype=np.uint32)
-    there = _pack_groups(goal, compiler_target(precision).lanes, precision)
+    there = pack_lanes(goal.transpose(2, 0, 1), precision)
     _run_job(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
     whole = tally[:, 0] if tally.shape[1] == 1 else tally.sum(axis=1, dtype=np.uint32)
     return sums[:, :num_samples].astype(float, copy=False), whole, worst[:, :num_samples]
@@ -527,7 +530,7 @@ def _run_job(model: Dynamics, batch: RolloutBatch, job: RolloutJob, precision: P
         "environment": pad_samples(batch.environment, wide, precision),
         "extra": pad_samples(batch.tau_extra, wide, precision),
     }
-    drawn = [_pack_groups(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
+    drawn = [pack_lanes(part.transpose(1, 2, 0), precision) for part in batch.components]
     arrays: dict[str, Array] = {
         "lengths": as_c_longs(len(part) for part in series.values()),
         "counts": as_c_longs(part.shape[1] for part in drawn),

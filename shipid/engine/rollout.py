@@ -205,31 +205,6 @@ def _distances_of_engine(way: Engine, model: Dynamics, batch: RolloutBatch, job:
     return Distances(*(np.concatenate(parts) for parts in zip(*measured, strict=True)))
 
 
-def rates_of_change(
-    vessel: Vessel,
-    start: Mapping[str, Array],
-    commands: Mapping[str, Array],
-    environment: Mapping[str, Array],
-    memory: Mapping[str, Array],
-    *,
-    parameters: Array,
-    keep: Sequence[str],
-) -> Array:
-    """Rates of change (., S) of some states, such as accelerations, by an Euler step of 1 s; arguments of `rollout`.
-
-    They are correct to the last digits of the states, 1e-15 m/s^2.
-    """
-    model, batch = prepare_batch(
-        vessel, start, commands, environment, {}, 1, parameters, memory, tau_extra=None, helmsman=None
-    )
-    job = RolloutJob(1.0, 1, "euler", 1, channel_places(keep, channel_names(model), vessel))
-    with np.errstate(all="ignore"):
-        before, after = run_with_fallback(
-            None, lambda: choose_engine(batch, job, repeated=True), lambda way: way.run(model, batch, job)[0][:, 0]
-        )
-        return np.asarray((after - before).T)
-
-
 def prepare_batch(
     vessel: Vessel,
     start: Mapping[str, Array],

@@ -52,18 +52,11 @@ def mirrored_sides(values: Array, reflection: Array | None) -> Array:
     return np.stack([values] if reflection is None else [values, values @ reflection])
 
 
-def kernel_values(points: Any, centres: Any, linear: Any, maths: Any = np) -> Any:
-    """exp(-|z - c|^2 / 2) + l (1 + z c) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales."""
-    values = bell_values(points, centres, maths)
-    values += (linear * with_constant(points, maths)) @ with_constant(centres, maths).T
-    return values
-
-
 def weighed_kernels(sides: Any, centres: Any, linear: Any, weights: Any, maths: Any = np) -> Any:
-    """Kernels times weights (C, R), (S, R), of windows as they are and, where there is a mirror, of their images.
+    """Kernels exp(-|z - c|^2 / 2) + l (1 + z c) times weights (C, R): outputs (S, R) of windows.
 
-    sides : (K, S, d), K being 1 or 2. centres : (C, d). Both are divided by their scales. The linear kernel goes
-    through the few inputs, not through the centres.
+    sides : (K, S, d), windows as they are and, where there is a mirror, their images. centres : (C, d). Both are
+    divided by their scales. The linear kernel goes through the few inputs, not through the centres.
     """
     slopes = linear * (with_constant(centres, maths).T @ weights)
     values = bell_values(sides, centres, maths) @ weights + with_constant(sides, maths) @ slopes

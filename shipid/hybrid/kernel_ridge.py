@@ -21,7 +21,6 @@ from shipid.hybrid.kernel_compensator import (
     KernelMember,
     bell_values,
     kernel_group,
-    kernel_values,
     mirrored_sides,
     weighed_kernels,
     with_constant,
@@ -49,10 +48,9 @@ class KernelProblem(PathProblem):
         self.varying = VaryingInputs.of(self.rows(self.windows), method.mirror)
         self.scales = [f"{kernel_group(name)}_scale" for name in self.varying.normaliser.names]
         values, reflection = self.varying.normaliser.apply(self.table), self.varying.reflection
-        self.values, self.outputs = self._tensor(values), self._tensor(self.weights.T)  # (S, d), (2, S, r)
-        self.sides = self._tensor(mirrored_sides(values, reflection))  # (K, S, d)
-        if reflection is None:
-            self.outputs = torch.cat([*self.outputs], dim=1)[None]
+        self.values, self.sides = self._tensor(values), self._tensor(mirrored_sides(values, reflection))  # (K, S, d)
+        apart = self.weights.T.reshape(len(self.sides), -1, *self.weights.T.shape[1:])  # x and y, or both together
+        self.outputs = self._tensor(np.concatenate([*apart.swapaxes(0, 1)], axis=2))  # (K, S, R)
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
         self.parts = min(method.trials, len(task.folds))
         self.few = self.parts > 1 and len(task.folds) < FOLDS_OF_PART * method.trials
@@ -64,7 +62,8 @@ class KernelProblem(PathProblem):
         """Kernels (K, S, C) between windows, with the settings of a trial: those of x and of y, or one of both."""
         scales = self._tensor([settings[name] for name in self.scales])
         sides, around = self.sides[:, points] / scales, self.values[centres] / scales
-        return mirror_sums(kernel_values(sides, around, settings["linear"], torch))
+        plane = (settings["linear"] * with_constant(sides, torch)) @ with_constant(around, torch).T
+        return mirror_sums(plane + bell_values(sides, around, torch))
 
     def folds_left_out(self, number: int) -> list[tuple[Index, Index]]:
         """Folds that a trial leaves out of its choice of scales."""
@@ -121,22 +120,19 @@ class KernelProblem(PathProblem):
         Centres that any fold leaves out come last in the Cholesky factor, [[L, 0], [A, B]]: the last block of G is then
         the inverse of B B^T, and what is above it is -L^-T A^T times that.
         """
-        outs = np.array(
-            [np.zeros(len(self.part), dtype=bool), *(~np.isin(self.part, training) for training, _ in folds)]
-        )
+        outs = np.array([~np.isin(self.part, kept) for kept in (self.part, *(training for training, _ in folds))])
         order, first = np.argsort(outs.any(axis=0), kind="stable"), int((~outs.any(axis=0)).sum())
         part = self.part[order]
         kernel = self.kernels(part, part, settings)
         kernel.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
         factor = torch.linalg.cholesky(kernel)
         weights = torch.cholesky_solve(self.outputs[:, part], factor)
-        top, across, inverse = factor[:, :first, :first], factor[:, first:, :first], factor[:, first:, first:]
-        inverse, last = torch.cholesky_inverse(inverse), weights[:, first:]
+        inverse, last = torch.cholesky_inverse(factor[:, first:, first:]), weights[:, first:]
         places = map(np.flatnonzero, outs[:, order[first:]])
         parts = [inverse[:, :, b] @ torch.linalg.solve(inverse[:, b][:, :, b], last[:, b]) for b in places]
-        below = torch.cat(parts, dim=2)
-        above = torch.linalg.solve_triangular(top.mT, across.mT @ below, upper=True)
-        changes = torch.cat([-above, below], dim=1).split(weights.shape[2], dim=2)
+        below, left = torch.cat(parts, dim=2), factor[:, :, :first].mT  # L^T beside A^T
+        above = torch.linalg.solve_triangular(left[:, :, :first], left[:, :, first:] @ below, upper=True)
+        changes = torch.chunk(torch.cat([-above, below], dim=1), len(parts), dim=2)
         return [torch.cat([*(weights - change)[:, np.argsort(order)]], dim=1) for change in changes]
 
     def corrector(self, best: Sequence[Row]) -> KernelCompensator:

@@ -102,7 +102,9 @@ def calibrate_alarm(
     scale = np.sqrt(runs.weight @ (values - runs.weight @ values) ** 2)
     values = values / scale
     full = np.column_stack([np.ones(len(values)), values])
-    moments = runs.means(full[:, :, None] * full[:, None, :])  # (G, d + 1, d + 1)
+    moments = np.stack(  # (G, d + 1, d + 1)
+        [rows.T @ rows / len(rows) for rows in (full[runs.place == one] for one in range(runs.count))]
+    )
     lows, highs = (
         np.stack([end(bounded[runs.place == one], axis=0) for one in range(runs.count)]) for end in (np.min, np.max)
     )

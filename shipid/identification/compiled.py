@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import Array
-from shipid.engine.native import C, StagedSource, compile_source, compiler_target, step_statements
+from shipid.engine.native import C, StagedSource, compile_source, compiler_target, pack_lanes, step_statements
 from shipid.engine.printing import print_function
 from shipid.engine.threads import run_tasks, threaded_source
 from shipid.engine.vectors import CompilerTarget, vector_source
@@ -81,13 +81,6 @@ static void outputs(const V *z, const V *m, const V *saved0, const V *saved1, co
 @lru_cache(maxsize=32)
 def _compile_variation(layout: FitLayout) -> Any:
     return compile_source(_VariationSource(build_variation(layout)).text(compiler_target()))
-
-
-def pack_lanes(array: Array) -> Array:
-    """Group predictions by SIMD lanes: (K, ..., entries) -> (groups, ..., entries, lanes); the last one is repeated."""
-    lanes, count = compiler_target().lanes, len(array)
-    filled = np.concatenate([array, np.repeat(array[-1:], -count % lanes, axis=0)])
-    return np.ascontiguousarray(np.moveaxis(filled.reshape(-1, lanes, *array.shape[1:]), 1, -1), dtype=float)
 
 
 def run_compiled(layout: FitLayout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:

@@ -58,11 +58,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -72,14 +73,15 @@ from scipy.special import exprel, ndtri
 
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, cumulative_integral, stretch_columns
-from shipid.engine.casadi import memory_along
-from shipid.engine.rollout import rates_of_change, rollout_distances
+from shipid.engine.casadi import input_symbols, memory_along, summed_rates
+from shipid.engine.rollout import rollout_distances
+from shipid.engine.samples import map_over_samples
 from shipid.errors import DataError
 from shipid.identification.causes import Cause, Motion, Scales, list_causes, multiply_signs, rotate_heading
 from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
-from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Steps = NDArray[np.integer[Any]]
@@ -148,17 +150,13 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it.
-
-    residuals : (6, W) of that log.
-    """
+    """A cause at its size theta (k,), with standard errors; residuals (6, W) on parts left out; the log without it."""
 
     cause: Cause
     theta: Array
     errors: Array
     left_out: Array
     motion: Motion
-    residuals: Array
 
     @property
     def counts(self) -> bool:
@@ -322,8 +320,8 @@ class _Log:
         every = np.stack([*(np.array(changes[:3]) - forces), turning, path.real, path.imag])
         return np.asarray(np.clip(np.nan_to_num(every, nan=HUGE), -HUGE, HUGE))
 
-    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: _Fit | None = None) -> _Fit:
-        """Fit a cause by Gauss-Newton from a fit or the start of least misfit; one that lowers nothing stays."""
+    def estimate(self, cause: Cause, rounds: int = ROUNDS, begin: Array | None = None) -> _Fit:
+        """Fit a cause by Gauss-Newton from a size or the start of least misfit; one that lowers nothing stays."""
         trials = np.array(cause.trial)
 
         def change(theta: Array) -> tuple[Motion, Array]:
@@ -335,11 +333,8 @@ class _Log:
                 z[list(cause.scaled)] *= np.exp(max(theta[0], 0.0))  # neither way makes less of an error
             return motion, z
 
-        if begin is None:
-            starts = (np.zeros(len(trials)), *map(np.atleast_1d, cause.starts))
-            theta, motion, z = min(((one, *change(one)) for one in starts), key=lambda one: self.misfit(one[2]))
-        else:
-            theta, motion, z = begin.theta, begin.motion, begin.residuals
+        begins = [np.zeros(len(trials)), *map(np.atleast_1d, cause.starts)] if begin is None else [begin]
+        theta, (motion, z) = min(((one, change(one)) for one in begins), key=lambda one: self.misfit(one[1][1]))
         J, unit = np.zeros((len(theta), *z.shape)), np.eye(len(theta))
         if cause.of_runs:  # a change of all runs at once: none feels the number of another
             unit = np.repeat(np.eye(2), len(theta) // 2, axis=1)
@@ -369,7 +364,7 @@ class _Log:
             if out.any() and not out.all():
                 step = np.clip(self._step(J, z, ~out), -20 * trials, 20 * trials)
                 left[:, out] += np.tensordot(step, J[:, :, out], 1)
-        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion, z)
+        return _Fit(cause, theta, np.sqrt(np.diag(self._covariance(J, z))), left, motion)
 
     def beyond_noise(self, errors: Array) -> float:
         """Mean error [m] of paths without what the noise of the log makes of it."""
@@ -435,7 +430,7 @@ class _Log:
 class _VesselLog(_Log):
     """A log with the vessel that should have made it."""
 
-    _kept: tuple[Array, Array] | None = None
+    _kept: Array | None = None
 
     def __init__(
         self,
@@ -456,8 +451,8 @@ class _VesselLog(_Log):
         super().__init__(dataset, runs)
 
     def repair(self, motion: Motion) -> None:
-        """Take another motion for the log, whose actuators and forces are kept."""
-        self._kept = self.memory(motion), self.forces(motion)
+        """Take another motion for the log, whose actuators are kept."""
+        self._kept = self.memory(motion)
         super().repair(motion)
 
     def causes(self) -> list[Cause]:
@@ -471,58 +466,44 @@ class _VesselLog(_Log):
         """Actuator states (M, N) that the orders of a log reach: other changes of the log leave those that are kept."""
         names, columns = self.model.memory, motion.columns
         if self._kept is not None and all(columns[name] is self.motion.columns[name] for name in names):
-            return self._kept[0]
+            return self._kept
         start, stop = np.transpose([(part.start, part.stop) for part in motion.stretches])
         steps = np.arange((stop - start).max())
-        rows, inside = np.minimum(start + steps[:, None], stop - 1), steps < (stop - start)[:, None]
+        rows, inside = np.minimum(start[:, None] + steps, stop[:, None] - 1), steps < (stop - start)[:, None]
         reached = memory_along(self.vessel, {name: columns[name][rows] for name in names}, motion.step * steps) or {}
-        return np.reshape([one.T[inside] for one in reached.values()], (len(names), len(columns["u"])))
+        return np.reshape([one[inside] for one in reached.values()], (len(names), len(columns["u"])))
 
     def forces(self, motion: Motion) -> Array:
-        """Mean accelerations (3, W) over the bumps by the physics; those of the log as it is are kept."""
-        turned = any(motion.columns[name].any() for name in self.environment)
-        names = ["u", "v", "r", *self.commands, *self.environment, *["psi"] * turned]
-        same = all(motion.columns[name] is self.motion.columns[name] for name in names)
-        if self._kept is not None and same and motion.parameters is self.motion.parameters:
-            return self._kept[1]
+        """Mean accelerations (3, W) over the bumps by the physics."""
         return np.asarray(self.accelerations(motion, self.used)[:, self.place] @ (EVERY * self.phi[::EVERY]))
 
     def accelerations(self, motion: Motion, at: Steps) -> Array:
         """Accelerations (3, n) of u, v, r by the physics at n steps."""
-        return self._rates(motion, *self._inputs(motion, at, at))
+        return _mapped_rates(self.model)(*self._inputs(motion, at), motion.parameters)[0]
 
-    def _rates(self, motion: Motion, *inputs: Mapping[str, Array]) -> Array:
-        return rates_of_change(self.vessel, *inputs, parameters=motion.parameters[None], keep=("u", "v", "r"))
-
-    def _inputs(self, motion: Motion, at: Steps, during: Steps) -> list[dict[str, Array]]:
-        """Named states at n steps, commands and environment during others, and actuators at the n steps.
-
-        States that no column has are 0.
-        """
-        columns, still = self.states(motion), np.zeros(len(at))
-        names = {name: state_column(name) for name in (*self.model.state, *self.model.hidden)}
-        return [
-            {name: columns[column][at] if column in columns else still for name, column in names.items()},
-            {name: columns[name][during] for name in self.commands},
-            {name: columns[name][during] for name in self.environment},
-            dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
-        ]
+    def _inputs(self, motion: Motion, at: Steps) -> list[Array]:
+        """States, actuators, commands and environment, each (., n), at n steps."""
+        columns = self.states(motion)
+        given = (
+            np.array([columns[name][at] for name in names]).reshape(-1, len(at))
+            for names in (self.commands, self.environment)
+        )
+        return [self._start(columns, at), self.memory(motion)[:, at], *given]
 
     def _with_drift(self, motion: Motion) -> Motion:
         """The log with its heading, where that is a course: sway is that of the physics, from a while before on."""
         if not motion.course:
             return motion
         speed = np.hypot(motion.columns["u"], motion.columns["v"])
-        sway = np.zeros(len(speed))
-        inputs = self._inputs(motion, np.arange(len(sway)), np.arange(len(sway)))
+        sway, row = np.zeros(len(speed)), self.model.state.index("v")
+        states, *inputs = self._inputs(motion, np.arange(len(sway)))
         parts = [(at, p.start, p.stop - 1) for p in motion.stretches for at in range(p.start, p.stop, SHORTEST)]
         start, first, last = np.transpose(parts)
-        v = np.zeros(len(start))
+        v, rates = np.zeros(len(start)), _mapped_rates(self.model)
         for k in range(-SHORTEST, SHORTEST):
             at = np.clip(start + k, first, last)
-            sway[at] = v = np.clip(v, -speed[at], speed[at])
-            states, *others = ({name: values[at] for name, values in one.items()} for one in inputs)
-            v = v + motion.step * self._rates(motion, states | {"v": v}, *others)[1]
+            sway[at] = states[row, at] = v = np.clip(v, -speed[at], speed[at])
+            v = v + motion.step * rates(states[:, at], *(one[:, at] for one in inputs), motion.parameters)[0][1]
         drift = np.arcsin(sway / np.maximum(speed, 1e-12)) * np.sign(motion.columns["u"])
         return rotate_heading(replace(motion, course=False), [drift])
 
@@ -530,19 +511,26 @@ class _VesselLog(_Log):
         """Residuals (6, W): measured change less predicted change, a unit of time."""
         return super().residuals(self._with_drift(motion))
 
+    def _start(self, columns: Mapping[str, Array], at: Steps) -> Array:
+        """States (., n) at n steps; those that no column has are 0."""
+        names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
+        return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
+
     def path_errors(self, motion: Motion) -> Array:
         """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
         motion = self._with_drift(motion)
-        columns, rows = motion.columns, self.paths + np.arange(self.ahead + 1)[:, None]
-        *inputs, memory = self._inputs(motion, self.paths, rows[:-1])
+        columns, at = self.states(motion), self.paths
+        rows = at + np.arange(self.ahead + 1)[:, None]
         found = rollout_distances(
             self.vessel,
-            *inputs,
+            dict(zip((*self.model.state, *self.model.hidden), self._start(columns, at), strict=True)),
+            {name: columns[name][rows[:-1]] for name in self.commands},
+            {name: columns[name][rows[:-1]] for name in self.environment},
             np.stack([columns["north"][rows[1:]], columns["east"][rows[1:]]], axis=-1),
             step=self.step,
             method="rk4",
             parameters=motion.parameters[None],
-            memory=memory,
+            memory=dict(zip(self.model.memory, self.memory(motion)[:, at], strict=True)),
         )
         far = LOST * self.scales.length
         return np.asarray(np.where(found.diverged[0], far, np.minimum(found.total[0] / self.ahead, far)))
@@ -565,6 +553,19 @@ def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
     total = cumulative_integral(t, values)
     low, high = (np.clip(grid + side * step / 2, t[0], t[-1]) for side in (-1, 1))
     return np.asarray((np.interp(high, t, total) - np.interp(low, t, total)) / (high - low))
+
+
+@lru_cache(maxsize=16)
+def _mapped_rates(model: Dynamics) -> Callable[..., list[Array]]:
+    """(state, memory, commands, environment, each (., n), parameters) -> [accelerations (3, n) of u, v, r].
+
+    It is compiled where it can be, as a diagnosis calls it some hundred times.
+    """
+    inputs = input_symbols(model)
+    rates = ca.SX(summed_rates(model, inputs, ca.SX.zeros(model.num_dof), {}))
+    rows = [model.state.index(name) for name in ("u", "v", "r")]
+    function = ca.Function("accelerations", inputs, [rates[rows]], [*INPUTS], ["rates"], {"cse": True})
+    return map_over_samples(function, np.inf, INPUTS[-1:])
 
 
 def _unsigned_shafts(log: _VesselLog) -> Iterator[Cause]:
@@ -670,7 +671,7 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     given = log.plain_residuals, log.path_errors(log.motion)
     first = {cause.key: log.estimate(cause, 1) for cause in causes}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
-    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key]) for key in near}
+    fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
     rest = min(log.misfit(z) for z in (given[0], *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
     fits |= {
         key: replace(fit, cause=replace(fit.cause, cost=np.inf))

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from shipid.data.checks import white_noise_of
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import find_compiler, refuse_compiling
+from shipid.engine.native import find_compiler, pack_lanes, refuse_compiling
 from shipid.errors import DataError, DocumentError, suggest_name
-from shipid.identification.compiled import pack_lanes, run_compiled
+from shipid.identification.compiled import run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
 from shipid.identification.sensitivities import FitLayout, Variation, build_variation, is_thrust, run_machine
 from shipid.identification.settings import (

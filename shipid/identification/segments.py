@@ -113,9 +113,8 @@ def _shortest_segment(step: float, horizon: float) -> float:
 
 def near_a_row(t: Array, instants: Array, step: float) -> NDArray[np.bool_]:
     """Whether a row at t (N,) [s] of the log lies within half a step of each of some instants [s]."""
-    after = np.abs(t[np.clip(np.searchsorted(t, instants), 0, len(t) - 1)] - instants)
-    before = np.abs(t[np.clip(np.searchsorted(t, instants) - 1, 0, len(t) - 1)] - instants)
-    return np.asarray(np.minimum(after, before) <= step / 2 + clock_slack(t))
+    around = np.clip(np.searchsorted(t, instants) - [[0], [1]], 0, len(t) - 1)
+    return np.asarray(np.abs(t[around] - instants).min(axis=0) <= step / 2 + clock_slack(t))
 
 
 def _cut_segments(

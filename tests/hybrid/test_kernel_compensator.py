@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.hybrid.kernel_compensator import GROUPS, kernel_group, kernel_values
+from shipid.hybrid.kernel_compensator import GROUPS, kernel_group, weighed_kernels
 
 
 def test_groups_and_values_by_hand() -> None:
@@ -12,5 +12,5 @@ def test_groups_and_values_by_hand() -> None:
     groups = ("motion", "command", "wind", "history", "turned", "position", "position", "history", "error")
     assert tuple(map(kernel_group, names)) == groups
     assert set(groups) <= set(GROUPS)
-    made = kernel_values(np.array([[1.0, 2.0]]), np.array([[1.0, 2.0], [3.0, 2.0]]), 0.5)
+    made = weighed_kernels(np.array([[[1.0, 2.0]]]), np.array([[1.0, 2.0], [3.0, 2.0]]), 0.5, np.eye(2))
     np.testing.assert_allclose(made, [[1 + 0.5 * 6, np.exp(-2) + 0.5 * 8]])

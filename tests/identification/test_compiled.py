@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.engine.native import compiler_target, find_compiler
-from shipid.identification.compiled import pack_lanes, run_compiled
+from shipid.engine.native import compiler_target, find_compiler, pack_lanes
+from shipid.identification.compiled import run_compiled
 from shipid.identification.sensitivities import FitLayout, build_variation, run_machine
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
