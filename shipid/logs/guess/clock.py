@@ -455,7 +455,7 @@ def _clock_fault(table: pd.DataFrame, name: str, values: Array) -> str:
     """What is wrong with a clock (N,): its first text that is no time, or where it goes back or repeats."""
     wrong = ~np.isfinite(values)
     if wrong.any():
-        texts = column_called(table, name).astype(str).str.strip()
+        texts = column_called(table, name).astype(str).fillna("").str.strip()
         of_day = texts.str.fullmatch(TIME_OF_DAY).to_numpy(dtype=bool)
         wrong = ~of_day if wrong.all() and of_day.mean() > 0.5 else wrong  # a single other text, and none is read
         row = int(np.argmax(wrong))

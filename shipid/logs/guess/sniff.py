@@ -169,6 +169,8 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         if missing:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
+    for values in columns.values():  # of no ship, and squares would overflow
+        values[np.abs(values) > np.finfo(np.float32).max] = np.nan
     made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
     made |= {name: quaternion_yaw([columns[part] for part in parts]) for name, parts in turned.items()}
     made |= {name: values for name, (source, values) in in_text.items() if name != source}
