@@ -32,12 +32,13 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
     from scipy.io.matlab import matfile_version
 
     try:
-        version, content = matfile_version(file)[0], memoryview(file.read_bytes())
+        version, content = matfile_version(file)[0], file.read_bytes()
         if version > 1:  # 2 of version 7.3, which is HDF5
             message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
             raise DataError(message, file=file, path="format.kind")
         if version == 1:
-            _check_elements(content[128:], ">" if content[126:128] == b"MI" else "<", NUMBERS | {MATRIX, PACKED})
+            order = ">" if content[126:128] == b"MI" else "<"
+            _check_elements(memoryview(content)[128:], order, NUMBERS | {MATRIX, PACKED})
         variables = loadmat(file, simplify_cells=True)
         vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))
     except (DataError, OSError, MemoryError):  # the last of the system, whatever is in the file
