@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 
+from shipid.errors import escape_unprintable
+
 Rows = list[list[float]]
 MOST_ENDS = 3  # how often an FMU may hang or end its process before its other runs are given up
 TO_LOAD = 60.0  # s that loading an FMU may take
@@ -100,7 +102,7 @@ def _last_line(log: int) -> str:
     """The last line that the FMU printed into a file, in brackets."""
     end = os.fstat(log).st_size
     lines = os.pread(log, LAST_LINE, max(end - LAST_LINE, 0)).decode(errors="replace").split("\n")
-    return next((f" ({line.strip()})" for line in reversed(lines) if line.strip()), "")
+    return next((f" ({escape_unprintable(line.strip())})" for line in reversed(lines) if line.strip()), "")
 
 
 class FmuInstance:

@@ -397,9 +397,7 @@ def read_fmu(name: str | Path, relative_to: Path | None = None) -> Fmu:
     }
     path = documents.find_document(Path(table.file), "models", file.parent)
     description = _read_description(path)
-    variables = {
-        one.name: one for one in description.modelVariables if one.type in ("Real", "Float64") and not one.dimensions
-    }
+    variables = _numbers(description)
     for one in variables.values():  # by its name, where no row says else
         if one.causality in ("input", "output") and _is_signal(one.name):
             rows.setdefault(one.name, [FmuRow(variable=one.name)])
@@ -444,6 +442,10 @@ def _read_description(path: Path) -> Any:
     try:
         description = fmpy.read_model_description(str(path), validate=False)
         platforms = fmpy.supported_platforms(str(path))
+        with zipfile.ZipFile(path) as archive:
+            if damaged := archive.testzip():
+                raise ValueError(f"{damaged!r} in it is damaged")
+        _ = [float(one.start) for one in _numbers(description).values() if one.start is not None]
     except Exception as error:  # of the archive, of its XML or of what that says
         raise DocumentError(f"is no FMU: {' '.join(str(error).split())[:200]}", file=path) from None
     if description.coSimulation is None:
@@ -452,6 +454,13 @@ def _read_description(path: Path) -> Any:
         there = ", ".join(platforms) or "no platform"
         raise DocumentError(f"has no binary for {fmpy.platform}, but for {there}: `fmpy compile` makes one", file=path)
     return description
+
+
+def _numbers(description: Any) -> dict[str, Any]:
+    """The real variables of an FMU that are no arrays, by name."""
+    return {
+        one.name: one for one in description.modelVariables if one.type in ("Real", "Float64") and not one.dimensions
+    }
 
 
 def _is_signal(name: str) -> bool:

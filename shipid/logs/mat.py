@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -14,6 +16,10 @@ from shipid.errors import DataError
 from shipid.logs.formats import MatFormat
 
 ENOUGH_VECTORS = 4  # of one length: clock, position and heading
+NUMBERS = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
+MATRIX, PACKED = 14, 15
+HOLDERS = frozenset({1, 2, 3, 16, 17})
+"""Types of elements, and classes of matrices that hold others: MathWorks, MAT-File Format, tables 1-1, 1-3; scipy."""
 MOST_SIGNALS = 100  # columns of a matrix that has fewer rows: more are times
 
 
@@ -26,9 +32,13 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
     from scipy.io.matlab import matfile_version
 
     try:
-        if matfile_version(file)[0] > 1:  # 2 of version 7.3, which is HDF5
+        version, content = matfile_version(file)[0], file.read_bytes()
+        if version > 1:  # 2 of version 7.3, which is HDF5
             message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
             raise DataError(message, file=file, path="format.kind")
+        if version == 1:
+            order = ">" if content[126:128] == b"MI" else "<"
+            _check_elements(memoryview(content)[128:], order, NUMBERS | {MATRIX, PACKED})
         variables = loadmat(file, simplify_cells=True)
         vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))
     except (DataError, OSError, MemoryError):  # the last of the system, whatever is in the file
@@ -54,6 +64,28 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
     anew = {name for name, _, remedy in further if remedy} | {*short}
     table.attrs["notes"] = [f"{name!r} is {what}" for name, what in table.attrs["other"].items() if name in anew]
     return table
+
+
+def _check_elements(content: memoryview, order: str, allowed: frozenset[int]) -> None:
+    """Raise ValueError for an element of no allowed type, or longer than what holds it: scipy would end the process.
+
+    order : of bytes, as of `struct`.
+    """
+    at = 0
+    while len(content) - at >= 8:
+        kind, size = struct.unpack_from(f"{order}II", content, at)
+        small, begin = kind >> 16, at + 8
+        if small:  # type, size and at most 4 bytes in the place of type and size
+            kind, size, begin = kind & 0xFFFF, small, at + 4
+        held = content[begin : begin + size]
+        if kind not in allowed or len(held) < size:
+            raise ValueError("an element of a type or a size that cannot be")
+        if kind == PACKED:
+            _check_elements(memoryview(zlib.decompress(held)), order, frozenset({MATRIX}))
+        elif kind == MATRIX and size:
+            matrices = held[8 if order == "<" else 11] in HOLDERS
+            _check_elements(held, order, NUMBERS | {MATRIX} if matrices else NUMBERS)
+        at = begin + size + (4 - size if small else 0 if kind == PACKED else -size % 8)
 
 
 def _longest_measure(vectors: dict[str, np.ndarray[Any, Any]]) -> str:
@@ -94,6 +126,7 @@ def _open_structs(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple
         if isinstance(value, dict):
             yield from _open_structs(value, f"{prefix}{key}.")
         elif _is_sparse(value) and min(value.shape) == 1:
+            value.check_format()  # else indices that are not in it write where they lead
             yield f"{prefix}{key}", value.toarray().squeeze()
         else:
             yield f"{prefix}{key}", value

@@ -88,6 +88,8 @@ def read_log_table(
             reader = READERS[form.kind]
             with locate_errors(f"the reader {form.kind!r}", reader.read, "reader"):
                 table = reader.read(file, form, (clock, *columns), progress)
+            if not isinstance(table, pd.DataFrame):  # of a package
+                raise DataError(f"the reader {form.kind!r} gives {type(table).__name__}, no table", file=file)
     except OSError as error:
         if error.errno is None:  # of a library, not of the system
             raise DataError(

@@ -285,47 +285,27 @@ def full(seed: int) -> None:
 
 
 def together(seed: int) -> None:
-    """Two or three runs of one plan in one folder at once, one perhaps killed: one works, the others are refused."""
+    """Two, three or twenty runs of one plan in one folder at once, some killed: one works, the others are refused."""
     rng = random.Random(seed)
     with a_place() as place:
-        plan = searched_plan(place)
+        plan, count = searched_plan(place), rng.choice([2, 3, 20])
+        pause, victims = rng.choice([0.0, 0.1, 0.5]) if count < 20 else 0.0, rng.choice([0, 0, 1, count // 10])
         runs = []
-        for _ in range(rng.choice([2, 2, 3])):
+        for _ in range(count):
             runs.append(start(lambda: run_here(plan, place / "run")))
-            time.sleep(rng.choice([0.0, 0.0, 0.1, 0.5]))
-        killed_one = rng.random() < 0.4
-        if killed_one:
+            time.sleep(pause)
+        for one in rng.sample(runs, victims):
             with suppress(ProcessLookupError):
-                os.kill(runs[0], signal.SIGKILL)
+                os.kill(one, signal.SIGKILL)
+            time.sleep(rng.choice([0.0, 0.3]))
         codes = [finish(one) for one in runs]
-        if not {*codes} <= {0, 1, -signal.SIGKILL} or (not killed_one and 0 not in codes):
+        if not {*codes} <= {0, 1, -signal.SIGKILL} or (not victims and 0 not in codes):
             raise Failure("not one alone", f"exit codes {codes}")
         _continued(place, f"{len(runs)} runs at once")
         other = searched_plan(place, {"truth.seed": 7})
         if child(lambda: run_here(other, place / "run")) != 1:
             raise Failure("mixed", "another plan was not refused")
         _same_as_reference(place / "run", "after another plan")
-
-
-def many_starts(seed: int) -> None:
-    """Twenty runs of one plan in one folder at the same moment, two of them killed: nothing is mixed."""
-    rng = random.Random(seed)
-    with a_place() as place:
-        plan, gate = searched_plan(place), time.monotonic() + 0.3
-
-        def begin() -> None:
-            time.sleep(max(0.0, gate - time.monotonic()))
-            run_here(plan, place / "run")
-
-        runs = [start(begin) for _ in range(20)]
-        for one in rng.sample(runs, 2):
-            time.sleep(rng.choice([0.0, 0.3, 0.5]))
-            with suppress(ProcessLookupError):
-                os.kill(one, signal.SIGKILL)
-        codes = {finish(one) for one in runs}
-        if not codes <= {0, 1, -signal.SIGKILL}:
-            raise Failure("not one alone", f"exit codes {sorted(codes)}")
-        _continued(place, "twenty runs at once")
 
 
 def shards(seed: int) -> None:
@@ -487,7 +467,7 @@ def ships(seed: int) -> None:
         return pd.DataFrame({"ship": [name], "H": [float(len(name))]})
 
     def run(at: int) -> None:
-        with patch.object(ships_study, "study_ship", study), without_workers_of_ships():
+        with patch.object(ships_study, "study_ship", study):
             _killed_at(at, lambda: list(ships_study.run_ships(place / "run", 0, 3)))
 
     with a_place() as place:
@@ -511,13 +491,6 @@ def ships(seed: int) -> None:
             .equals(wanted.sort_values("ship").reset_index(drop=True))
         ):
             raise Failure("mixed", *words)
-
-
-@contextmanager
-def without_workers_of_ships() -> Iterator[None]:
-    """The study over ships computes in this process."""
-    with patch.object(ships_study, "on_workers", lambda work, units, _: ((one, work(one)) for one in units)):
-        yield
 
 
 def two_plans(seed: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,32 @@ def test_the_descriptions_are_valid(folder):
     validation = pytest.importorskip("fmpy.validation")
     for version in (2, 3):
         assert validation.validate_fmu(str(build_ship(folder / f"valid{version}.fmu", version))) == []
+
+
+@pytest.mark.parametrize(
+    ("ending", "old", "new", "words"),
+    [
+        (".so", b"fmi2DoStep", b"fmi2DoStop", r"\.so' in it is damaged"),
+        (".xml", b'start="', b'start="x', "to float: 'x"),
+    ],
+)
+def test_a_part_that_is_damaged_is_refused(tmp_path, ending, old, new, words):
+    """Before, a traceback at the first run."""
+    file = build_ship(tmp_path / "ship.fmu", 2)
+    table = write_table(file)
+    with zipfile.ZipFile(file) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, content in parts.items():
+            archive.writestr(
+                name, content.replace(old, new) if name.endswith(ending) == (ending == ".xml") else content
+            )
+    if ending == ".so":  # of which the archive has another checksum
+        content = file.read_bytes()
+        assert old in content
+        file.write_bytes(content.replace(old, new))
+    with pytest.raises(DocumentError, match=rf"is no FMU: .*{words}"):
+        as_fmu(table)
 
 
 def record_of_run(rows=60):

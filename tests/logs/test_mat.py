@@ -1,5 +1,7 @@
 """What a MATLAB file may hold beside vectors, and how it is read or named."""
 
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +12,10 @@ from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
 from shipid.errors import DataError
+from shipid.logs.formats import MatFormat
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mat import is_mat
+from shipid.logs.readers import read_log_table
 from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
 
 
@@ -49,6 +53,29 @@ def test_a_matlab_variable_that_is_no_vector_is_named(name: str, log: pd.DataFra
     with pytest.raises(DataError, match=message) as caught:
         import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"')), tmp_path / "log.mat")
     assert caught.value.path == "columns.propeller.n.from"
+
+
+@pytest.mark.parametrize("kind", [0, 8, 10, 14, 15, 19, 200])
+@pytest.mark.parametrize("packed", [False, True])
+def test_data_of_a_type_that_there_is_not_is_refused(kind: int, packed: bool, tmp_path: Path) -> None:
+    """Before, the process ended, in scipy."""
+    file, tag = tmp_path / "log.mat", struct.pack("<II", 9, T.nbytes)
+    savemat(file, {"time": T})
+    content = file.read_bytes()
+    assert content.count(tag) == 1
+    content = content.replace(tag, struct.pack("<II", kind, T.nbytes))
+    inner = zlib.compress(content[128:])
+    file.write_bytes(content[:128] + struct.pack("<II", 15, len(inner)) + inner if packed else content)
+    with pytest.raises(DataError, match="or damaged"):
+        read_log_table(file, MatFormat(kind="mat"), "time")
+
+
+def test_a_sparse_vector_with_an_index_outside_it_is_refused(tmp_path: Path) -> None:
+    vector = csc_matrix(T[:, None])
+    vector.indices[3] = 10**9
+    savemat(tmp_path / "log.mat", {"time": vector})
+    with pytest.raises(DataError, match="or damaged"):
+        read_log_table(tmp_path / "log.mat", MatFormat(kind="mat"), "time")
 
 
 def test_a_matlab_file_of_version_7_3_has_its_remedy(tmp_path: Path) -> None:

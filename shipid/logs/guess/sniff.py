@@ -166,6 +166,8 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         if missing:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
+    for values in columns.values():  # of no ship, and squares would overflow
+        values[np.abs(values) > np.finfo(np.float32).max] = np.nan
     made = _degree_columns(columns) | _quaternion_columns(columns)
     made |= {name: ((source,), values) for name, (source, values) in in_text.items() if name != source}
     in_parts = {name: parts for name, (parts, _) in made.items()} | in_units

@@ -284,6 +284,14 @@ def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str,
     assert words in caught.value.message
 
 
+def test_a_clock_of_numbers_that_lacks_one_is_named(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"time": np.arange(90.0), "north": np.arange(90.0) ** 2})
+    frame.loc[3, "time"] = np.nan
+    frame.to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(DataError, match="'time' holds '' in row 4, no number or time"):
+        recognise_log(tmp_path / "log.parquet")
+
+
 def in_columns(frame: pd.DataFrame, fields: dict[str, str], begin: str = "2024-02-29T23:59:57.5") -> pd.DataFrame:
     """A log with its moments in columns: name -> what `strftime` makes of a moment, as a number."""
     moments = pd.Timestamp(begin) + pd.to_timedelta(frame["time"], "s")

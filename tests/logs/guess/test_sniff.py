@@ -234,6 +234,14 @@ def test_positions_as_text(
     assert not any("Latitude" in note or "Position" in note for note in sniffed.notes)
 
 
+@pytest.mark.parametrize("value", ["1e39", "-1e300"])
+def test_a_number_that_no_ship_has_is_none(value: str, tmp_path: Path) -> None:
+    """Before, a search among velocities ended in an overflow."""
+    table = TABLE.assign(rudder=np.sin(T)).astype(object)
+    table.loc[4, "rudder"] = value
+    assert np.flatnonzero(np.isnan(sniff(tmp_path, table).columns["rudder"])).tolist() == [4]
+
+
 @pytest.mark.parametrize("value", ["32767", "-999.25", "9.96921e+36", "327.67"])
 def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path) -> None:
     """The largest number of an integer of 16 or 32 bits, perhaps in tenths, and what netCDF and well logs have."""
