@@ -79,7 +79,7 @@ class AnswerCase:
         """The best of the best physics model, no physics and the regression by validation loss with the most runs."""
         largest, plan, losses = self.table.amounts[-1], self.results.plan, self.results.regression_loss
         top = self.rows[self.rows["N_D"] == largest].set_index("model")["loss"]
-        known = {name: float(top[name]) for name in (self.best, NO_MODEL) if name in top}
+        known = {name: float(top[name]) for name in (self.best, NO_MODEL) if name is not None and name in top}
         of_batches = [losses.get(batch.key, np.nan) for batch in plan.batches if largest == batch.N_D]
         known |= {REGRESSION: float(np.mean(of_batches))} if REGRESSION in self.table.H else {}
         first = self.best if plan.families else NO_MODEL

@@ -180,7 +180,7 @@ def symbolic_physics(physics: Physics) -> SymbolicPhysics:
     return SymbolicPhysics(**{one.name: getattr(physics, one.name) for one in fields(Physics)})
 
 
-def symbolic_instants(names: InputLayout, given: NamedExpressions) -> Instants:
+def symbolic_instants(names: InputLayout, given: Mapping[str, MX]) -> Instants:
     """The instant of symbols of `InputLayout.sizes`; places are relative to it."""
     columns = rows_by_name(names.now, given["now"], 1)
     estimates = rows_by_name(names.estimates, given["estimates"], 1)

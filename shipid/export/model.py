@@ -218,7 +218,9 @@ class ExportModel:
         now, instants = split_by_name(layout.now, inputs["now"]), symbolic_instants(layout, inputs)
         physics, moved = symbolic_physics(self.predictor.physics), symbolic_physics(self.physics)
         given = ca.reshape(inputs["physics"], 2, layout.horizon).T if layout.physics else None
-        alone = physics.paths(instants) if given is None else ca.ArrayInterface.MX(given, shape=(layout.horizon, 1, 2))
+        alone: Any = (
+            physics.paths(instants) if given is None else ca.ArrayInterface.MX(given, shape=(layout.horizon, 1, 2))
+        )
         try:
             predicted: Any = symbolic_corrector(corrector).predict(physics, instants, alone)
             path = MX(predicted.reshape(physics.horizon, 2)).T

@@ -50,7 +50,8 @@ def test_a_trial_step_is_felt_and_a_repair_holds_its_numbers(ship: str) -> None:
         after = cause.change(motion, np.array(cause.trial))
         moved = [name for name, values in motion.columns.items() if not np.array_equal(after.columns[name], values)]
         assert moved or after.course or not np.array_equal(after.parameters, motion.parameters), cause.key
-        assert "{" not in (text := cause.repair_text(np.array(cause.trial))), cause.key
+        text = cause.repair_text(np.array(cause.trial))
+        assert "{" not in text, cause.key
         if "offset" in text and "[[repair]]" not in text:
             assert f"offset = {-cause.trial[0]:.4g}  # {cause.unit}, added to what is there" in text, cause.key
 

@@ -138,7 +138,7 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
 def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path) -> None:
     windows, paths, naive, regression, losses = store.read_test(tiny_run)
     store.write_test(tmp_path, windows, paths, naive, regression, losses)
-    again, others, floor, regressed, lost = store.read_test(tmp_path)
+    again, others, floor, regressed, kept = store.read_test(tmp_path)
     assert {key: path.tolist() for key, path in regressed.items()} == {k: p.tolist() for k, p in regression.items()}
     np.testing.assert_array_equal(again.future, windows.future)
     np.testing.assert_array_equal(floor, naive)
@@ -148,6 +148,7 @@ def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path)
         assert one.keys() == other.keys()
         assert all(np.array_equal(one[key], other[key]) for key in one)
     assert others.keys() == paths.keys()
+    assert kept == losses
     (tmp_path / store.TEST).write_bytes(b"no archive")
     with pytest.raises(ResultError, match="damaged"):
         store.read_test(tmp_path)
