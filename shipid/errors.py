@@ -72,7 +72,7 @@ def placed_errors(
     try:
         yield
     except kind as error:
-        place = path(error.path or "") if callable(path) else path or error.path
+        place = (path(error.path or "") or None) if callable(path) else path or error.path
         raise (into or type(error))(error.message, file=file if path else error.file or file, path=place) from None
 
 

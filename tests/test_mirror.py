@@ -21,11 +21,10 @@ ELSEWHERE = {
     # the parts of one graph: what is written from them equals Python, for every method
     **{
         f"export/{part}.py": "export/test_c.py"
-        for part in ("c_predictor", "c_vessel", "correctors", "equations", "known", "model", "recorder")
+        for part in ("c_predictor", "c_vessel", "equations", "known", "model", "recorder")
     },
     "export/fmu_c.py": "export/test_fmu.py",
     "engine/fmu_process.py": "foundations/test_fmu.py",
-    "hybrid/deployed.py": "test_predictor.py",
 }
 
 

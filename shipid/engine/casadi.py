@@ -14,7 +14,7 @@ from shipid.interrupts import hold_interrupts
 from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
-# steps of one call in `memory_along`, samples of one in `_evaluate_samples`: made once, whatever is asked for; steps
+# steps of one call in `memory_along`, samples of one in `evaluate_samples`: made once, whatever is asked for; steps
 # of the former that are one expression
 BLOCK, UNROLLED = 256, 16
 
@@ -22,7 +22,9 @@ BLOCK, UNROLLED = 256, 16
 def call_function(function: ca.Function, *inputs: Array) -> Array:
     """Output of a function of one dense output at dense inputs, none of which is copied into a matrix of CasADi's."""
     (buffer, evaluate), result = function.buffer(), np.empty(function.size_out(0), order="F")
-    given = [np.ravel(one, "F") for one in inputs]
+    given = [np.ravel(np.asarray(one, dtype=float), "F") for one in inputs]
+    if [one.size for one in given] != [function.nnz_in(i) for i in range(function.n_in())]:
+        raise ValueError(f"{function.name()} takes inputs of other sizes")
     for i, one in enumerate(given):
         buffer.set_arg(i, memoryview(one))  # type: ignore[call-arg]  # a view has its size
     buffer.set_res(0, memoryview(result.T))  # type: ignore[call-arg]

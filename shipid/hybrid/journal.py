@@ -7,6 +7,7 @@ line that a killed process left half written is cut off when the file is opened 
 from __future__ import annotations
 
 import json
+import os
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -80,7 +81,7 @@ def whole_lines(file: Path) -> bytes:
     content = file.read_bytes() if file.exists() else b""
     whole = content[: content.rfind(b"\n") + 1]
     if whole != content:
-        file.write_bytes(whole)
+        os.truncate(file, len(whole))  # a kill leaves one or the other
     return whole
 
 

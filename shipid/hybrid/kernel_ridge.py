@@ -109,7 +109,7 @@ class KernelProblem(PathProblem):
 
         options = {"maxfun": self.method.steps}
         best = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", bounds=ends, options=options)
-        values = np.clip(np.exp(best.x), *np.exp(ends).T)
+        values = np.clip(np.exp(best.x), *np.array([ranges[name] for name in names]).T)
         squares = np.exp(best.fun - prior * np.square(best.x - start).sum())
         chosen = {**point, **dict(zip(names, map(float, values), strict=True))}
         return float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)

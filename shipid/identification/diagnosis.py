@@ -174,7 +174,9 @@ class _Log:
     numbers: tuple[float, ...] = ()
 
     def __init__(self, dataset: Dataset, runs: Sequence[str]) -> None:
-        self.mapped = (dataset.metadata.get("mapping") or {}).get("columns", {})
+        mapping = dataset.metadata.get("mapping")
+        columns = mapping.get("columns", {}) if isinstance(mapping, dict) else {}  # of another program, too
+        self.mapped = {name: one for name, one in columns.items() if {"size", "offset", "unit"} <= {*one}}
         stretches = [(run, rows) for run, rows in stretch_columns(dataset) if run in runs]
         every = {name: np.concatenate([rows[name] for _, rows in stretches]) for name in ("u", "v", "r")}
         speed = float(np.sqrt(np.mean(every["u"] ** 2 + every["v"] ** 2)))

@@ -97,7 +97,9 @@ def parse_dates(dates: pd.Series[Any]) -> Array:
         since = np.array(pd.to_timedelta(texts, errors="coerce").dt.total_seconds())
     elif not texts.str.fullmatch(ISO).mean() > 0.5 and (found := texts.str.extract(MOMENT))[1].notna().mean() > 0.5:
         hour, minute, second = (pd.to_numeric(found[place]) for place in (1, 2, 3))
-        since, half = (3600.0 * hour + 60.0 * minute + second.fillna(0.0)).to_numpy(np.float64), found[4].str.lower()
+        of_clock = (hour < 24) & (minute < 60) & ~(second >= 61)  # others are damaged
+        since = (3600.0 * hour + 60.0 * minute + second.fillna(0.0)).where(of_clock).to_numpy(np.float64)
+        half = found[4].str.lower()
         of_day = np.where(half.isna(), since, since % HALF_DAY + HALF_DAY * half.eq("pm"))  # 12 AM is midnight
         alone = found[0].isna()
         of_one = over_midnights(np.where(alone, of_day, np.nan))

@@ -114,7 +114,7 @@ def import_log(
     source, off = as_path("file", file, DataError), tuple(without)
     for kind in off:
         check_choice("repair", kind, REPAIRS, DataError)
-    digest = log_digest(mapping, source)
+    digest, state = log_digest(mapping, source), _state_of_files(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(
             "not the file this mapping was written for (sha256 differs): fetch that file, or copy the mapping, "
@@ -130,7 +130,7 @@ def import_log(
             mapping = mapping.model_copy(
                 update={"origin": PlaneOrigin.model_construct(latitude=first[0], longitude=first[1])}
             )
-    if digest != log_digest(mapping, source):  # at its end, or by a link that leads elsewhere
+    if (digest, state) != (log_digest(mapping, source), _state_of_files(mapping, source)):  # or a link led elsewhere
         raise DataError("has changed while it was read: import it again when nothing writes to it", file=source)
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows, repairs = parts[0].rows, _add_records([part.records for part in parts])
@@ -207,10 +207,20 @@ def clean_name(name: str) -> str:
 
 def log_digest(mapping: Mapping, log: Path) -> str:
     """The SHA-256 of the log in hex; for several files, the SHA-256 of their SHA-256s joined."""
-    files = [*run_files(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
-    digests = [file_digest(file) for file in files]
+    digests = [file_digest(file) for file in _files_of_log(mapping, log)]
     several = mapping.source.runs is not None or mapping.file
     return hashlib.sha256("".join(digests).encode()).hexdigest() if several else digests[0]
+
+
+def _files_of_log(mapping: Mapping, log: Path) -> list[Path]:
+    return [*run_files(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
+
+
+def _state_of_files(mapping: Mapping, log: Path) -> list[tuple[int, int]]:
+    """Number and time of change [ns] of files and of links on the way to them: a change that was taken back differs."""
+    files = _files_of_log(mapping, log)
+    links = [place.lstat() for file in files for place in (file, *file.absolute().parents) if place.is_symlink()]
+    return [(state.st_ino, state.st_ctime_ns) for state in (*links, *(file.stat() for file in files))]
 
 
 def file_digest(file: Path) -> str:
@@ -327,6 +337,7 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
         for repair in others
     ]
     rows, more = apply_repairs(rows, others, off, file)
+    _check_limits(rows, t, numbered, file)  # which would overflow in the filter
     rows, estimated = _estimate_velocities(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     relative = mapping.columns["beta_w"].relative if "beta_w" in mapping.columns else False
     if relative == "angle":

@@ -102,6 +102,13 @@ def test_of_day_and_month_that_is_taken_with_which_the_log_is_short(style: str) 
     assert format_date(times[0]) == "2025-06-05 23:59:00"
 
 
+@pytest.mark.parametrize("damaged", ["08:06:99", "08:75:00", "25:10:00", "24:00:00", "08:00:61"])
+@pytest.mark.parametrize("day", ["14.05.2024 ", ""])
+def test_a_time_of_day_that_no_clock_shows_is_none(day: str, damaged: str) -> None:
+    texts = pd.Series([f"{day}08:0{minute}:00" for minute in range(5)] + [day + damaged])
+    assert np.isfinite(parse_dates(texts)).tolist() == [True] * 5 + [False]
+
+
 def test_noon_and_midnight_of_twelve_hours() -> None:
     texts = ["12:00:00 AM", "12:30:00 am", "1:00:00 AM", "12:00:00 PM", "12:15:00PM", "11:59:59 pm"]
     np.testing.assert_allclose(parse_dates(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])

@@ -440,6 +440,7 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     kind = type("Mine", (METHODS["path-drawn"],), {"__module__": "__main__"})
     monkeypatch.setitem(METHODS, "mine", kind)
     monkeypatch.setattr(run, "run_unit", lambda *_: [])
+    monkeypatch.setattr(run, "journal_by_topic", lambda *_: None)
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
     written = {"code of the method": {"mine": "01234567"}}
     (session, after), _ = run._on_cluster((plan, None, "cpu", written, []), (plan.units[0], b""), Silent())  # type: ignore[arg-type]

@@ -1,15 +1,17 @@
-"""A sign or a frame that a part of a log has alone: a file of a folder, or a stretch of one log."""
+"""A unit, a sign or a frame that a part of a log has alone: a file of a folder, or a stretch of one log."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.lapses import clock_text
 from shipid.logs.guess.search import senses_of_angle
 from shipid.logs.guess.settings import SETTINGS
@@ -20,19 +22,20 @@ Windows = NDArray[np.bool_]
 Change = tuple[tuple[str, ...], str, list[int]]
 """Columns that it is about, a sentence with a place for where it is, and numbers of the parts."""
 STRETCHES, FEWEST = 10, 20  # of one log; windows of a file or stretch that decides, at least
+SCALED = 0.005  # share of a motion that one scale leaves, at least, where there are two
 APART = np.radians(1.0)  # by which the track keeps to a heading more than to a course, at least
 UNDER_WAY = 0.4  # of the larger speeds: below, thrust turns a ship as much as an angle does
 
 
 def ask_for_changes(state: State, pause: float) -> None:
-    """Ask where a part has another sense than the rest, or a file another frame; `pause` [s] parts files."""
+    """Ask where a part has another scale or sense than the rest, or a file another frame; `pause` [s] parts files."""
     edges = [0, *(1 + np.flatnonzero(np.diff(state.t) > 0.5 * pause)).tolist(), len(state.t)]
     files = len(edges) > 2
     if not files:
         edges = np.linspace(0, len(state.t), STRETCHES + 1).astype(int).tolist()
     middle = (state.chosen.first + state.chosen.last) // 2
     parts = [(middle >= first) & (middle < end) for first, end in pairwise(edges)]
-    changes = [*_other_senses(state, parts, edges)]
+    changes = [*_other_scales(state, parts), *_other_senses(state, parts, edges)]
     changes += [*_course_as_heading(state, parts, middle), *_other_axes(state, parts, middle)] if files else []
     for about, words, odd in changes:
         ends = edges[odd[0]], min(edges[odd[-1] + 1], len(state.t) - 1)
@@ -42,6 +45,41 @@ def ask_for_changes(state: State, pause: float) -> None:
         elif state.joined:
             place = "in a part of the files"
         state.ask(about, words.replace("{}", place))
+
+
+def _other_scales(state: State, parts: list[Windows]) -> Iterator[Change]:
+    """Yield where the integral of velocities, or of a yaw rate, is the motion with another scale than in most parts."""
+    sources = {one.name: one.source for one in state.suggestions}
+    relations: list[tuple[tuple[str, ...], NDArray[Any], NDArray[Any]]] = []
+    if state.velocity is not None:
+        relations.append((tuple(sources.keys() & {"u", "v", "speed"}), state.position, state.velocity))
+    for name in [sources["r"]] if "r" in sources else state.called("r")[:1]:
+        sources["r"] = name
+        relations.append((("r",), state.psi, state.columns[name]))
+    for about, motion, rate in relations:
+        seen, ran = map(state.chosen.change, (motion, evidence.integrate_rate(state.t, rate)))
+        odd, ratio = odd_scales(seen, ran, parts)
+        if odd:
+            words = f"has {' and '.join(repr(sources[name]) for name in sorted(about))} another unit or sign {{}}?"
+            words += f" There the motion is {ratio:.3g} times as much, beside its integral, as elsewhere. Write the log"
+            yield about, f"{words} in one unit, or cut it there, import the parts and join them (shipid data join)", odd
+
+
+def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[int], float]:
+    """The parts of the windows (W,) in which seen = scale * ran has another scale than in most; its ratio to theirs."""
+    fits = [evidence.fit_without_outliers(seen[one], ran[one]) if one.sum() >= FEWEST else None for one in parts]
+    scales = {number: fit.scale for number, fit in enumerate(fits) if fit and fit.left < SETTINGS.two_left}
+    usual = sorted(scales.values())[len(scales) // 2] if scales else 0.0
+    odd = [one for one, scale in scales.items() if not 1 / SETTINGS.alike < scale / usual < SETTINGS.alike]
+    if not odd:
+        return [], 1.0
+    both = [np.any([parts[one] for one in of], axis=0) for of in (odd, scales.keys() - {*odd})]  # no part that is mixed
+    two = [evidence.fit_scale(seen[rows], ran[rows]) for rows in both]
+    motion = [float(np.sum(np.abs(seen[rows]) ** 2)) for rows in both]
+    one_left = evidence.fit_scale(seen[both[0] | both[1]], ran[both[0] | both[1]]).left
+    left = sum(fit.left * size for fit, size in zip(two, motion, strict=True)) / sum(motion)
+    clear = one_left > SCALED and left < SETTINGS.two_left * one_left
+    return (odd, two[0].scale / two[1].scale) if clear else ([], 1.0)
 
 
 def _course_as_heading(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:

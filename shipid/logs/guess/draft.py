@@ -165,7 +165,9 @@ def _origin_lines(guess: Guess) -> Iterator[str]:
     columns = [column for key in ("latitude", "longitude") if (column := guess.column(key)) is not None]
     if columns and (guess.source.pattern is not None or "no fix" in guess.kinds):
         places = np.array([guess.sniffed.columns[column.source] for column in columns])
-        first = places[:, np.flatnonzero((np.isfinite(places) & ~np.isin(places, FILLS)).all(axis=0))[:1]]
+        known = np.isfinite(places).all(axis=0)
+        sure = known & ~np.isin(places, FILLS).any(axis=0)
+        first = places[:, np.flatnonzero(sure if sure.any() else known)[:1]]
         origin = {}
         for column, value in zip(columns, first, strict=True):
             value = degrees_and_minutes(value) if column.unit == "ddmm" else value * column.extra.get("factor", 1.0)

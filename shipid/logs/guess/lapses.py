@@ -1,4 +1,4 @@
-"""Rows that hold no value: spikes, fills between rows far from them, lapses of commands."""
+"""Rows that hold no value: spikes, fills between rows far from them, lapses of commands, sensors that are stuck."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def report_stuck_sensors(state: State) -> None:
         long = lengths >= LONG * np.median(np.repeat(lengths, lengths))
         others = ran if one.name == "psi" else state.psi
         spans = [
-            (int(first) + 1, int(last) + 2)  # a jump that follows may be taken for one across 360
+            (int(first) + 1, min(int(last) + 2, len(t)))  # a jump that follows may be taken for one across 360
             for first, last in zip(edges[:-1][long], edges[1:][long] - 1, strict=True)
             if t[last] - t[first] >= LEAST
             and abs(others[last] - others[first] - steady[first] * (t[last] - t[first])) > TURNED

@@ -34,6 +34,8 @@ class SearchSettings:
     astern : share of the turning shaft's rows in which it turns astern, of a ship that goes astern all the time.
     turned : range of a heading that no name says [rad], at least.
     advance : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05).
+    alike : ratio of two scales that are one.
+    two_left : share of what one scale leaves that two leave, at most.
     steady : share of the mean wind speed by which a wind may change while the ship turns.
     """
 
@@ -57,6 +59,8 @@ class SearchSettings:
     astern: float = 0.9
     turned: float = 0.14
     advance: float = 0.01
+    alike: float = 1.4
+    two_left: float = 0.3
     steady: float = 0.25
 
 

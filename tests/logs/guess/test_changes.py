@@ -1,4 +1,4 @@
-"""A sign or a frame that another part of a log has is asked, with its place."""
+"""A unit, a sign or a frame that another part of a log has is asked, with its place."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import cumulative_integral
-from shipid.logs.guess.changes import ask_for_changes
+from shipid.logs.guess.changes import FEWEST, ask_for_changes, odd_scales
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.sources import PAUSE
 from tests.drawn import seeds
@@ -19,17 +19,50 @@ CLEAN = as_bridge(si_log()).round(4)
 END = float(CLEAN["time"].iloc[-1])
 
 
-def test_a_change_of_sign_is_asked_with_its_time(tmp_path: Path) -> None:
-    turned = CLEAN.assign(rudder=CLEAN["rudder"].where(CLEAN["time"] <= 0.4 * END, -CLEAN["rudder"]))
-    asked = [one.sentence for one in guess_of(tmp_path, turned).questions if "to the other side" in one.sentence]
+@pytest.mark.parametrize(
+    ("columns", "factor"),
+    [
+        (("u", "v"), 3600 / 1852),  # knots from there on
+        (("r",), np.pi / 180),
+        (("rudder",), -1.0),
+    ],
+)
+def test_a_change_of_unit_or_sign_is_asked_with_its_time(
+    columns: tuple[str, ...], factor: float, tmp_path: Path
+) -> None:
+    after = CLEAN["time"] > 0.4 * END
+    result = guess_of(
+        tmp_path, CLEAN.assign(**{name: CLEAN[name].where(~after, factor * CLEAN[name]) for name in columns})
+    )
+    asked = [
+        one.sentence
+        for one in result.questions
+        if "another unit or sign" in one.sentence or "to the other side" in one.sentence
+    ]
     assert len(asked) == 1, asked
+    assert all(repr(name) in asked[0] for name in columns)
     times = [float(text) for text in re.findall(r"t = ([\d.]+)", asked[0])]
-    assert min(abs(time - 0.4 * END) for time in times) < 0.05 * END, asked[0]
+    assert min(abs(time - 0.4 * END) for time in times) < 0.15 * END, asked[0]  # to one stretch and a half
 
 
-def test_a_log_of_one_sign_is_not_asked(tmp_path: Path) -> None:
+def test_a_log_of_one_unit_is_not_asked(tmp_path: Path) -> None:
     asked = [one.sentence for one in guess_of(tmp_path, CLEAN).questions]
-    assert not [sentence for sentence in asked if "to the other side" in sentence]
+    assert not [sentence for sentence in asked if "another unit or sign" in sentence]
+
+
+@pytest.mark.parametrize("seed", seeds(1, 3))
+def test_the_parts_with_another_scale_are_found(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    count, ratio = int(random.integers(10 * FEWEST, 1500)), float(random.choice([-1.0, 0.01, 0.5, 2.0, 60.0]))
+    ran = random.normal(5, 2, count) * np.exp(1j * random.uniform(0, 7, count))
+    parts = [np.isin(np.arange(count), rows) for rows in np.array_split(np.arange(count), 10)]
+    first = int(random.integers(0, 7))
+    inside = np.any(parts[first : first + 3], axis=0)
+    seen = np.where(inside, ratio, 1.0) * ran + random.normal(0, 0.001, count)
+    odd, found = odd_scales(seen, ran, parts)
+    assert odd == [first, first + 1, first + 2]
+    assert found == pytest.approx(ratio, rel=0.01)
+    assert odd_scales(ran + random.normal(0, 0.5, count), ran, parts)[0] == []
 
 
 @pytest.mark.parametrize("slow", [True, False])

@@ -288,7 +288,7 @@ def test_a_clock_of_numbers_that_lacks_one_is_named(tmp_path: Path) -> None:
     frame = pd.DataFrame({"time": np.arange(90.0), "north": np.arange(90.0) ** 2})
     frame.loc[3, "time"] = np.nan
     frame.to_parquet(tmp_path / "log.parquet")
-    with pytest.raises(DataError, match="'time' holds '' in row 4, no number or time"):
+    with pytest.raises(DataError, match="'time' in row 4: no time here: remove the row"):
         recognise_log(tmp_path / "log.parquet")
 
 

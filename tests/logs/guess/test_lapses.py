@@ -89,3 +89,8 @@ def test_a_sensor_that_is_stuck_in_a_turn_is_broken_out(name: str, seed: int, tm
             assert one.repair is not None
             (interval,) = one.repair["intervals"]
             assert interval == pytest.approx(frame["time"].iloc[[first, first + rows + 1]].to_list(), abs=1.1)
+            ended = guess_of(tmp_path, stuck.iloc[: first + rows])  # stuck to its last row
+            spans = [
+                one.repair["intervals"][-1] for one in ended.findings if one.kind == "frozen sensor" and one.repair
+            ]
+            assert all(span[1] < frame["time"].iloc[first + rows] + 1.1 for span in spans)
