@@ -110,14 +110,15 @@ class Cause:
         return tuple((np.exp(theta) if self.ratio else theta).tolist())
 
     def repair_text(self, theta: Array) -> str:
-        """The repair with the size in it."""
+        """The repair with the size in it, as lines of a mapping where it is a table."""
         sizes, (unit, there) = self.sizes(theta), self.offset
         words = {
             f"{name}{i}": f"{value:.4g}"
             for i, size in enumerate(sizes)
             for name, value in (("minus", -size), ("over", 1 / (size or np.inf)), ("offset", there - size / unit))
         }
-        return self.repair.format(*(f"{size:.4g}" for size in sizes), **words)
+        text = self.repair.format(*(f"{size:.4g}" for size in sizes), **words)
+        return text + '\nreason = "diagnosis"' * text.startswith("[[repair]]")
 
 
 def list_causes(

@@ -722,9 +722,9 @@ def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
     words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
     sized, unit = f"{' = ' * bool(words)}{', '.join(words)}", cause.unit.strip("1")
-    sentence = (
-        f"{result.how_far}: {result.cause}{sized}{' ' * bool(unit)}{unit} explains {percent_text(result.share)} of "
-        f"what is no noise; {' '.join(repair.split())}"
-    )
+    worth = f"explains {percent_text(result.share)} of what is no noise"
+    if result.share <= 0.0:
+        worth = "is seen in the motion, but paths are no better without it"
+    sentence = f"{result.how_far}: {result.cause}{sized}{' ' * bool(unit)}{unit} {worth}; {' '.join(repair.split())}"
     sentence += f"; {' or '.join(equals)} would look alike{cause.remedy}" if equals else ""
     return replace(result, size=sizes, interval=interval, repair=repair, sentence=sentence)
