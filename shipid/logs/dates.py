@@ -56,10 +56,10 @@ _SAID_OF_CLOCK = re.compile(
 """A zone in letters, in the name of a clock alone."""
 ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
 DAYS = (
-    *("%Y-%m-%d", "%Y-%j", "%Y%m%d", "%d.%m.%Y", "%d.%m.%y", "%d-%b-%Y"),
+    *("%Y-%m-%d", "%Y-%j", "%d.%m.%Y", "%d.%m.%y", "%d-%b-%Y"),
     *("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%y-%m-%d"),
 )
-"""Ways in which a date may be written, with - for any other mark than a point."""
+"""Ways in which a date may be written, with - for any other mark than a point, and between eight digits."""
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
 
 
@@ -122,6 +122,7 @@ def day_readings(days: pd.Series[Any]) -> list[Array]:
     """
     places, known = pd.factorize(days)
     texts = pd.Series(known, dtype="str").str.replace(r"[/ :_]+", "-", regex=True)
+    texts = texts.str.replace(r"^(\d{4})(\d\d)(\d\d)$", r"\1-\2-\3", regex=True)
     moments = (pd.Series(pd.to_datetime(texts, format=way, utc=True, errors="coerce")) for way in DAYS)
     read = (np.append(_since_1970(one), np.nan)[places] for one in moments)
     readings = [one for one in read if np.isfinite(one).sum() > 0.5 * len(one)]

@@ -109,6 +109,11 @@ def test_a_time_of_day_that_no_clock_shows_is_none(day: str, damaged: str) -> No
     assert np.isfinite(parse_dates(texts)).tolist() == [True] * 5 + [False]
 
 
+def test_a_day_of_six_digits_is_no_date_alone() -> None:
+    """131221 was the year 1312."""
+    assert np.isnan(parse_dates(pd.Series(["131221 10:53:18", "131221 10:53:19"]))).all()
+
+
 def test_noon_and_midnight_of_twelve_hours() -> None:
     texts = ["12:00:00 AM", "12:30:00 am", "1:00:00 AM", "12:00:00 PM", "12:15:00PM", "11:59:59 pm"]
     np.testing.assert_allclose(parse_dates(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
