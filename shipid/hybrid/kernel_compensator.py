@@ -89,9 +89,19 @@ class KernelCompensator(PathCorrector):
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
-        sides = mirrored_sides(self.normaliser.apply(table), self.reflection)
-        outputs = (
-            weighed_kernels(sides / one.scales, self.centres / one.scales, one.linear, one.weights)
-            for one in self.members
-        )
-        return weigh_shapes(self.basis, sum(outputs) / len(self.members))
+        z, terms = self.normaliser.apply(table), self.basis.shape[1]
+        total: Any = 0.0
+        for one in self.members:
+            centres = self.centres / one.scales
+            total = total + _kernel_values(z / one.scales, centres, one.linear) @ one.weights
+            if self.reflection is not None:
+                image = _kernel_values(z @ self.reflection / one.scales, centres, one.linear) @ one.weights
+                total = total + np.repeat([1.0, -1.0], terms) * image
+        return weigh_shapes(self.basis, total / len(self.members))
+
+
+def _kernel_values(points: Any, centres: Array, linear: float) -> Any:
+    """exp(-|z - c|^2 / 2) + l (1 + z c) (S, C), by what arrays of CasADi have, too."""
+    product = points @ centres.T
+    values = product - (points**2).sum(-1).reshape(-1, 1) / 2 - (centres**2).sum(-1) / 2
+    return np.exp(values) + linear * (1 + product)
