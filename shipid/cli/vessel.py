@@ -146,7 +146,7 @@ def vessel_new(
 
 @app.command("similar")
 def vessel_similar(
-    length: Annotated[float | None, typer.Option(min=0.01, help="m, between perpendiculars")] = None,
+    length: Annotated[float | None, typer.Option(min=0.01, max=1e6, help="m, between perpendiculars")] = None,
     beam: Annotated[float | None, typer.Option(min=0.01, help="m")] = None,
     draught: Annotated[float | None, typer.Option(min=0.01, help="m")] = None,
     block: Annotated[float | None, typer.Option(min=0.01, max=1.0, help="block coefficient")] = None,

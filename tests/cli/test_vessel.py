@@ -129,6 +129,7 @@ def test_a_log_ranks_similar_ships_by_their_error(tmp_path: Path) -> None:
         (("--length", 3, "--data", "log.parquet"), "error: --vessel: missing: give it, whose screws"),
         (("--length", -3), "error: Invalid value for '--length': Input should be greater"),
         (("--length", 30, "--block", 7), "error: Invalid value for '--block': Input should be less"),
+        (("--length", 1e308), "error: Invalid value for '--length': Input should be less"),
         (("--length", 30, "--beam", 90), "error: --beam: 90 m: must be below the length, 30 m"),
         (("--length", 30, "--from", "nowhere"), "error: nowhere: no vessel in the TOML files of this folder"),
     ],
