@@ -3,8 +3,8 @@
 `python docs/records.py paper-grid python docs/paper_grid.py RUN --hours 2` computes cells that
 `docs/records/paper-grid.csv` lacks, in the folder RUN, adds each to that file as it ends, and writes their table as the
 record. Amounts of 10, 30 and 100 runs come first. It may be interrupted at any time: a cell goes on from its last trial
-as long as RUN is there. With `--drawn` it computes the cells of `path-drawn` at the first amounts, all at once, and
-writes `docs/records/paper-grid-drawn.csv`. The site draws figures 8, 9 and 10 of both files whenever it is built.
+as long as RUN is there. With `--kernel` it computes the cells of `kernel` at the first amounts, all at once, and writes
+`docs/records/paper-grid-kernel.csv`. The site draws figures 8, 9 and 10 of both files whenever it is built.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from shipid.study.store import read_rows, shard_folder
 from shipid.version import __version__
 
 FILE = Path(__file__).parent / "records" / "paper-grid.csv"
-DRAWN = FILE.with_name("paper-grid-drawn.csv")
+KERNEL = FILE.with_name("paper-grid-kernel.csv")
 COLUMNS = ["model", "N_D", "A", "H", "H_90", "H_end", "seconds", "version"]
 FIRST = (10, 30, 100)
 """Amounts of data that are computed to the end before the others begin."""
@@ -45,11 +45,11 @@ def missing_cells(plan: Plan, known: pd.DataFrame) -> list[int]:
     return [number for _, _, number in sorted(units)]
 
 
-def table_of_errors(rows: pd.DataFrame, drawn: pd.DataFrame) -> str:
-    """The cells as a table of H over models and amounts, each beside that of `path-drawn`, and what the cells took."""
+def table_of_errors(rows: pd.DataFrame, kernel: pd.DataFrame) -> str:
+    """The cells as a table of H over models and amounts, each beside that of `kernel`, and what the cells took."""
     amounts = sorted(set(rows["N_D"]))
-    wide = [one.pivot(index="model", columns="N_D", values="H") for one in (rows, drawn)]
-    heads = [f"{N_D}{words}" for N_D in amounts for words in ("", ", `path-drawn`")]
+    wide = [one.pivot(index="model", columns="N_D", values="H") for one in (rows, kernel)]
+    heads = [f"{N_D}{words}" for N_D in amounts for words in ("", ", `kernel`")]
     lines = [f"| model | A [m] | {' | '.join(heads)} |", f"| --- |{' ---: |' * (1 + len(heads))}"]
     for model, accuracy in rows.groupby("model")["A"].first().sort_values(na_position="last").items():
         values = [one.get(N_D, pd.Series(dtype=float)).get(model, np.nan) for N_D in amounts for one in wide]
@@ -89,12 +89,12 @@ def counts_of_findings(rows: pd.DataFrame) -> list[str]:
     return [*lines, "S7 needs the paths, which these rows do not hold."]
 
 
-def beside_drawn(rows: pd.DataFrame, drawn: pd.DataFrame) -> str:
-    """How H of the cells compares with that of `path-drawn` on the same cells."""
-    both = rows.merge(drawn, on=["model", "N_D"], suffixes=("", "_drawn"))
-    ratio = both["H"] / both["H_drawn"]
+def beside_kernel(rows: pd.DataFrame, kernel: pd.DataFrame) -> str:
+    """How H of the cells compares with that of `kernel` on the same cells."""
+    both = rows.merge(kernel, on=["model", "N_D"], suffixes=("", "_kernel"))
+    ratio = both["H"] / both["H_kernel"]
     lower = f"lower in {int((ratio < 1).sum())} of {len(ratio)} cells"
-    return f"Against `path-drawn` H is {np.exp(np.log(ratio).mean()):.2f} times as large (geometric mean), {lower}."
+    return f"Against `kernel` H is {np.exp(np.log(ratio).mean()):.2f} times as large (geometric mean), {lower}."
 
 
 def figures_page() -> str:
@@ -106,7 +106,7 @@ def figures_page() -> str:
     ]
     lines += ["The first bar or point, N_D = 0, is the physics alone. [Record](../records/paper-grid.md).", ""]
     lines += ["```{raw} html", '<script src="../_static/plotly-cartesian.min.js"></script>', "```", ""]
-    for file, name in ((FILE, "The paper's recipe"), (DRAWN, "`path-drawn` on the same cells")):
+    for file, name in ((FILE, "The paper's recipe"), (KERNEL, "`kernel` on the same cells")):
         cells = pd.read_csv(file)
         family = cells["model"].str.rpartition("-")[0].where(cells["model"] != DATA_DRIVEN, DATA_DRIVEN)
         content = figures.content_of(cells.assign(family=family))
@@ -125,14 +125,14 @@ def figures_page() -> str:
     return "\n".join(lines)
 
 
-def compute_drawn(folder: Path) -> None:
-    """Compute the cells of `path-drawn`, the default of the product, and write their rows."""
-    method = [{"name": "drawn", "kind": "path-drawn"}]
+def compute_kernel(folder: Path) -> None:
+    """Compute the cells of `kernel`, the default of the product, and write their rows."""
+    method = [{"name": "kernel", "kind": "kernel"}]
     plan = read_plan("simulation", {"method": method, "grid.N_D": list(FIRST)})
     for event in [*prepare_study(plan, folder), *run_study(plan, folder, workers=1)]:
         print(event.text or event.row.get("cell", ""), file=sys.stderr)
     rows = read_rows(folder).rename(columns={"foundation": "model"}).assign(version=__version__)
-    rows.loc[rows["model"] != "nominal", COLUMNS].to_csv(DRAWN, index=False)
+    rows.loc[rows["model"] != "nominal", COLUMNS].to_csv(KERNEL, index=False)
 
 
 def main() -> None:
@@ -140,10 +140,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run", type=Path, help="folder of the run, made where there is none")
     parser.add_argument("--hours", type=float, default=1.0, help="no cell begins later")
-    parser.add_argument("--drawn", action="store_true", help="compute the cells of `path-drawn` instead")
+    parser.add_argument("--kernel", action="store_true", help="compute the cells of `kernel` instead")
     given = parser.parse_args()
-    if given.drawn:
-        compute_drawn(given.run)
+    if given.kernel:
+        compute_kernel(given.run)
         return
     end, plan = time.monotonic() + 3600 * given.hours, read_plan("simulation")
     if not FILE.exists():
@@ -161,8 +161,8 @@ def main() -> None:
         row = read_rows(place).rename(columns={"foundation": "model"}).assign(version=__version__)
         row[COLUMNS].to_csv(FILE, mode="a", header=False, index=False)
         shutil.rmtree(place)
-    rows, drawn = pd.read_csv(FILE), pd.read_csv(DRAWN)
-    print(table_of_errors(rows, drawn), beside_drawn(rows, drawn), *counts_of_findings(rows), sep="\n\n")
+    rows, kernel = pd.read_csv(FILE), pd.read_csv(KERNEL)
+    print(table_of_errors(rows, kernel), beside_kernel(rows, kernel), *counts_of_findings(rows), sep="\n\n")
 
 
 if __name__ == "__main__":

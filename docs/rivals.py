@@ -17,17 +17,14 @@ from shipid.metrics import position_error
 from shipid.study.results import read_results
 from shipid.study.run import run_study
 
-PAST = {"history": [2.0, 4.0, 8.0], "turned": [10.0, 20.0], "error": 8.0}  # s
-BEFORE = {"trials": 24, "choose": True, "memory": PAST}  # of `quick` until 29 November 2026
+MEMORY = read_plan("quick").document["method"][0]["memory"]
 FAST: tuple[dict[str, Any], ...] = (
-    {"kind": "path-drawn", **BEFORE},
     {"kind": "hankel-dmd", "families": ["moderate", "high", "none"]},
     {"kind": "one-step", "families": ["moderate", "high", "none"]},
 )
 SLOW: tuple[dict[str, Any], ...] = (
-    {"kind": "path-refined", **BEFORE},
-    {"kind": "calibrator", "trials": 24, "memory": PAST},
-    {"kind": "forest", "memory": PAST},
+    {"kind": "calibrator", "memory": MEMORY},
+    {"kind": "forest", "memory": MEMORY},
     {"kind": "recurrent"},
     {"kind": "path-trained", "trials": 24},
 )
@@ -38,8 +35,6 @@ def run_methods(folder: Path, others: tuple[dict[str, Any], ...], amounts: list[
     """Method -> column -> H [m] and core-seconds of a cell; `quick` is run once."""
     own = read_plan("quick").document["method"]
     blocks = [*own, *({"name": one["kind"], "families": ["moderate"], **one} for one in others)]
-    if others is FAST:
-        blocks = [block | {"families": ["*"]} if block["name"] == "path-drawn" else block for block in blocks]
     for event in run_study(read_plan("quick", CHANGES | {"grid.N_D": amounts, "method": blocks}), folder, workers=1):
         print(event.text, file=sys.stderr)
     results, table = read_results(folder), {}

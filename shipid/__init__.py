@@ -26,9 +26,9 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.errors import ShipidError as ShipidError
     from shipid.foundations.predictions import prediction_table as prediction_table
     from shipid.hybrid.alone import Alone as Alone
+    from shipid.hybrid.kernel import Kernel as Kernel
     from shipid.hybrid.learned_force import LearnedForce as LearnedForce
     from shipid.hybrid.method import Case as Case, FitResult as FitResult, Task as Task
-    from shipid.hybrid.path_drawn import PathDrawn as PathDrawn
     from shipid.hybrid.path_trained import PathTrained as PathTrained
     from shipid.hybrid.physics import Physics as Physics
     from shipid.identification.outcome import run_identification as run_identification
@@ -73,8 +73,8 @@ _PUBLIC = {
     "FitResult": "shipid.hybrid.method",
     "Identify": "shipid.identification.settings",
     "Instants": "shipid.data.windows",
+    "Kernel": "shipid.hybrid.kernel",
     "LearnedForce": "shipid.hybrid.learned_force",
-    "PathDrawn": "shipid.hybrid.path_drawn",
     "PathTrained": "shipid.hybrid.path_trained",
     "Perturbation": "shipid.vessel.perturb",
     "Physics": "shipid.hybrid.physics",

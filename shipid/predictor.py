@@ -485,7 +485,7 @@ def fit(
 
     Parameters
     ----------
-    method : the method with its settings, such as `PathDrawn()`.
+    method : the method with its settings, such as `Kernel()`.
     physics : the vessel with its numbers, or none, with horizon and step of the windows.
     windows : windows that train and validate; keep test runs out of them.
     validation_runs : names of the runs that validate; the other runs train. None splits by the method's `validation`:
@@ -494,8 +494,8 @@ def fit(
     commands : `held` at their value at the instant, or `known` over the horizon.
     seed : of all that is random.
     refits : of methods that have no errors on runs left out for nothing, fit so many times more, each without a share
-        of the runs, to calibrate a band; 0 makes such predictors without a band. Only `alone`, and `path-drawn`
-        and `kernel` where several runs validate in turn, have such errors.
+        of the runs, to calibrate a band; 0 makes such predictors without a band. Only `alone`, and
+        `kernel` where several runs validate in turn, have such errors.
     kinds : kind of manoeuvre by run, for bands that hold their share for runs of a kind.
 
     Raises
@@ -504,7 +504,7 @@ def fit(
         horizon or step; the windows hold too short a past, lack a command of the vessel or are too few to be split; the
         physics has an observer; the physics or the training diverges.
     """
-    check_class("method", method, Method, "such as PathDrawn()", DataError)
+    check_class("method", method, Method, "such as Kernel()", DataError)
     kind = method_kind(method)
     check_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
     check_class("windows", windows, Windows, "as of `cut_windows`", DataError)

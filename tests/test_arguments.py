@@ -218,7 +218,7 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "profiles": (lambda: identify(profiles=3), "profiles must be a name, or several names"),
     "band": (lambda: identify(band="0.9"), "0.9 is no level of a band"),
     "validation runs": (
-        lambda: shipid.fit(shipid.PathDrawn(trials=1), PHYSICS, WINDOWS, validation_runs=ANY),
+        lambda: shipid.fit(shipid.Kernel(trials=1), PHYSICS, WINDOWS, validation_runs=ANY),
         "validation_runs must be a name, or several names",
     ),
     "integrator": (lambda: exported(integrator="rk5"), "integrator 'rk5' is not known: did you mean 'rk4'?"),

@@ -39,9 +39,9 @@ def test_an_unknown_argument_is_one_line(kind: Any) -> None:
 @pytest.mark.parametrize(
     ("kind", "given", "line"),
     [
-        (shipid.PathDrawn, {"trials": 0}, "PathDrawn.trials: 0: must be above 0"),
-        (shipid.PathDrawn, {"trials": True}, "PathDrawn.trials: True: must be a number"),
-        (shipid.PathDrawn, {"memory": {"error": [4.0, "8"]}}, "PathDrawn.memory.error.1: '8': must be a number"),
+        (shipid.Kernel, {"trials": 0}, "Kernel.trials: 0: must be above 0"),
+        (shipid.Kernel, {"trials": True}, "Kernel.trials: True: must be a number"),
+        (shipid.Kernel, {"memory": {"error": [4.0, "8"]}}, "Kernel.memory.error.1: '8': must be a number"),
         (Memory, {"error": True}, "Memory.error: True: must be a number"),
         (Memory, {"history": (2.0, -1.0)}, "Memory.history: -1.0: must be above 0"),
         (Identify, {"parameters": "hull.*"}, "Identify.parameters: 'hull.*': must be a list"),

@@ -34,7 +34,7 @@ def test_every_object_shows_itself(tiny_run: Path, tmp_path: Path) -> None:
         (path, "states 5 x 1 x 1 x", "interval"),
         (results, "missing 0 of 8", mean),
         (shipid.compare([tiny_run, tmp_path / "run"]), "names", "identical"),
-        (Predictor.load(cell), "method path-drawn", "physics.horizon"),
+        (Predictor.load(cell), "method kernel", "physics.horizon"),
     ]
     for one, line, words in shows:
         assert line in repr(one)

@@ -17,8 +17,8 @@ from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.hybrid.alone import UnchangedPath
-from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
+from shipid.hybrid.kernel_compensator import KernelCompensator
 from shipid.hybrid.novelty import calibrate_alarm
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
@@ -29,7 +29,7 @@ from shipid.vessel.load import load_vessel
 from tests.hybrid.runs import made
 from tests.study.tiny import logged
 
-CELL, PURE = "wrong-1+drawn-N0006-s0", "none+drawn-N0006-s0"
+CELL, PURE = "wrong-1+kernel-N0006-s0", "none+kernel-N0006-s0"
 
 
 @pytest.fixture(scope="module")
@@ -109,9 +109,9 @@ def test_windows_of_another_step_are_refused(tiny_run: Path, predictor: Predicto
 def test_physics_alone_and_compensation_alone(tiny_run: Path, predictor: Predictor) -> None:
     instants = read_test(tiny_run)[0].instants()
     compensator, physics = predictor.corrector, predictor.physics
-    assert isinstance(compensator, Compensator)
+    assert isinstance(compensator, KernelCompensator)
     alone = Predictor(physics, "alone", UnchangedPath({}))
-    pure = Predictor(replace(physics, vessel=None), "path-drawn", compensator)
+    pure = Predictor(replace(physics, vessel=None), "kernel", compensator)
     np.testing.assert_array_equal(alone.predict(instants), predictor.alone(instants))
     table = compensator.inputs.table(physics, instants)
     np.testing.assert_array_equal(pure.predict(instants), compensator.compensation(table))
@@ -169,7 +169,7 @@ class Trap:
 def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
     trap = np.empty(1, dtype=object)
     trap[0] = Trap()
-    for changes in ({"header": trap}, {"networks.0.normaliser.mean": trap}):
+    for changes in ({"header": trap}, {"normaliser.mean": trap}):
         file = rewritten(cell_file(tiny_run, CELL), tmp_path / "trap.npz", **changes)
         with pytest.raises(ResultError, match="not a predictor of shipid"):
             Predictor.load(file)
@@ -188,9 +188,9 @@ def test_a_pickle_inside_is_refused(tmp_path: Path, tiny_run: Path) -> None:
         ({"corrector": 3}, "damaged"),
         ({"method": "knn"}, r"the method 'knn', which is not known here: .*\(one that you wrote needs its package"),
         ({"method": None}, "damaged"),
-        ({"networks.0.basis": None}, "missing in the saved method"),
-        ({"networks.0.normaliser.mean": np.zeros(3)}, "do not fit together"),
-        ({"networks.0.normaliser.std": np.zeros(1)}, "std' must be above 0"),
+        ({"basis": None}, "missing in the saved method"),
+        ({"normaliser.mean": np.zeros(3)}, "do not fit together"),
+        ({"normaliser.std": np.zeros(1)}, "std' must be above 0"),
         ({"bands.spread": np.array([1.0, 0.0])}, "'bands.spread' must be above 0"),
         ({"bands.deviation": -np.ones(5)}, "'bands.deviation' must be above 0"),
         ({"bands.whole": np.arange(98.0)}, "whole: the arrays of the saved method do not fit"),
@@ -292,8 +292,8 @@ def test_a_log_is_predicted_by_what_was_known(tmp_path: Path) -> None:
 
 def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path) -> None:
     log, out = tiny_run / DATASET, tmp_path / "paths.csv"
-    with pytest.raises(ResultError, match=r"did you mean 'wrong-1\+drawn-N0006-s0'"):
-        predict_log(tiny_run, "wrong-1+drawn-N06-s0", log, None, out)
+    with pytest.raises(ResultError, match=r"did you mean 'wrong-1\+kernel-N0006-s0'"):
+        predict_log(tiny_run, "wrong-1+kernel-N06-s0", log, None, out)
     with pytest.raises(ResultError, match="holds no finished cells"):
         predict_log(tmp_path, CELL, log, None, out)
     with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):

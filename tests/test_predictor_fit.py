@@ -19,10 +19,10 @@ from shipid.errors import DataError, ShipidError
 from shipid.hybrid.alone import Alone, UnchangedPath
 from shipid.hybrid.features import Memory
 from shipid.hybrid.forest import Forest
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.one_step import OneStep
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import trial_row
@@ -31,7 +31,7 @@ from shipid.predictor import Predictor, _split_folds, fit
 from shipid.vessel.load import Vessel, load_vessel
 from tests.export.strange import drawn
 
-HORIZON, SMALL = 5, PathDrawn(trials=1, units=8, terms=2)
+HORIZON, SMALL = 5, Kernel(trials=2, steps=2, terms=2)
 NONE = Physics(None, HORIZON, 1.0)
 
 
@@ -69,7 +69,7 @@ def test_it_predicts_what_it_was_fitted_to(predictor: Predictor) -> None:
 
 
 def test_it_says_what_it_was_fitted_with(predictor: Predictor) -> None:
-    assert predictor.method == "path-drawn"
+    assert predictor.method == "kernel"
     assert predictor.limits["u"] == (2.0, 3.0)
     assert set(predictor.limits) == {"u", "v", "r", *WINDOWS.planned}
     assert not predictor.outside(WINDOWS.columns).any()
@@ -118,7 +118,7 @@ class Shared(Method):
 def test_a_method_without_a_name_is_refused_before_it_is_fitted() -> None:
     """A class that a user wrote, or one derived from a method of shipid: what it gave could not be saved."""
 
-    class Mine(PathDrawn):
+    class Mine(Kernel):
         def fit(self, task: Task) -> dict[str, FitResult]:
             raise AssertionError(task)
 
@@ -154,7 +154,7 @@ def test_one_run_is_split_in_time() -> None:
     ("method", "physics", "runs", "message"),
     [
         (SMALL, Physics(None, 4, 1.0), None, "the physics has 4 steps of 1 s, the windows have 5 steps of 1 s"),
-        (PathDrawn(memory=Memory(history=(3.0,))), NONE, None, "needs a past of 3 s: cut windows with past = 3"),
+        (Kernel(memory=Memory(history=(3.0,))), NONE, None, "needs a past of 3 s: cut windows with past = 3"),
         (Alone(), NONE, None, "'alone' needs a vessel"),
         (Alone(), Physics(load_vessel("mariner"), HORIZON, 1.0), None, "needs this command"),
         (SMALL, NONE, ["M1", "M9"], "validation_runs: no run with windows"),
@@ -201,7 +201,7 @@ def test_an_input_that_is_no_number_gives_no_path(method: Method, vessel: Vessel
         np.testing.assert_allclose(paths[:, rest], made.predict(instants)[:, rest], rtol=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("forest", 203), ("path-drawn", 204)])
+@pytest.mark.parametrize(("kind", "seed"), [("forest", 203), ("kernel", 204)])
 def test_a_past_that_is_no_number_gives_no_path(kind: str, seed: int) -> None:
     """Before, the error of the physics over the last seconds was 0 then, as if it had predicted them exactly."""
     strange = drawn(kind, seed, count=5)
@@ -220,7 +220,7 @@ def test_a_past_that_is_no_number_gives_no_path(kind: str, seed: int) -> None:
 @pytest.mark.parametrize("part", ["past", "hidden", "estimates"])
 def test_a_part_of_another_shape_is_named(part: str) -> None:
     """Before, one value was taken for all instants, and others ended in a ValueError."""
-    strange = drawn("path-drawn", 203, count=5, vessel="mariner")
+    strange = drawn("kernel", 203, count=5, vessel="mariner")
     given = getattr(strange.instants, part) or {"rudder.delta": np.zeros(5)}
     for name, values in given.items():
         for wrong in (values[..., :2], values[..., 0], values[None]):
@@ -438,8 +438,8 @@ def test_what_is_no_level_is_refused(predictor: Predictor, level: Any) -> None:
         ({"seed": -1}, "seed must be a whole number"),
         ({"seed": np.random.default_rng(0)}, "seed must be a whole number"),
         ({"refits": 1.5}, "refits must be a whole number"),
-        ({"method": PathDrawn}, r"method must be a Method, such as PathDrawn\(\), not <class"),
-        ({"method": "path-drawn"}, "method must be a Method, such as PathDrawn\\(\\), not 'path-drawn'"),
+        ({"method": Kernel}, r"method must be a Method, such as Kernel\(\), not <class"),
+        ({"method": "kernel"}, "method must be a Method, such as Kernel\\(\\), not 'kernel'"),
         ({"physics": load_vessel("gunnerus-28.9")}, "physics must be a Physics, such as Physics.*, not Vessel"),
         ({"windows": WINDOWS.instants()}, "windows must be a Windows, as of `cut_windows`, not Instants"),
         ({"validation_runs": [1]}, "validation_runs: no run with windows"),
@@ -471,7 +471,7 @@ def test_planned_commands_are_all_there_and_of_the_horizon() -> None:
 
 def test_one_fold_calibrates_no_band() -> None:
     """The runs that validate chose the trials and the ridge, and no other fold can choose them without these."""
-    method = PathDrawn(trials=2, units=20, terms=2)
+    method = Kernel(trials=2, steps=2, terms=2)
     one = fit(method, NONE, turns(12), validation_runs=["M1", "M2", "M3", "M4"])
     assert one.bands is None
     assert "refits" in one.provenance["no_band"]

@@ -61,8 +61,8 @@ def test_pages_of_keys_have_every_kind_with_its_keys_and_their_words(made: Modul
     assert all(f"`[{key}]`" in vessel or f'kind = "{key.partition(".")[2]}"' in vessel for key in TERMS)
     assert vessel.count("`propeller_inflow`: u_P = (1 - w_P) u") == 1, "what a docstring refers to is explained once"
     assert all(f'kind = "{kind}"' in mapping for kind in (*READERS, *REPAIRS))
-    row = re.search(r"^\| `offset` \|.*$", section(study, '`kind = "path-drawn"`'), re.MULTILINE)
-    assert row, "path-drawn has a row for `offset`"
+    row = re.search(r"^\| `offset` \|.*$", section(study, '`kind = "one-step"`'), re.MULTILINE)
+    assert row, "one-step has a row for `offset`"
     assert "large bends more" in row[0], "words of a docstring stand beside its key"
 
 

@@ -71,20 +71,18 @@ def blocks(page: str) -> list[str]:
 
 
 def test_the_main_job_of_the_documentation_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As printed, with two foundations instead of four and small networks: data lower the error of every foundation."""
+    """As printed, with two foundations instead of four and few steps: data lower the error of every foundation."""
     monkeypatch.chdir(tmp_path)
     main_job = blocks("python.md")[0]
     assert main_job.count("\n") <= 26
-    assert "PathDrawn()" in main_job
+    assert "Kernel()" in main_job
     assert '"members": 4' in main_job
     space: dict[str, Any] = {}
-    exec(
-        main_job.replace("PathDrawn()", "PathDrawn(trials=2, units=32)").replace('"members": 4', '"members": 2'), space
-    )
+    exec(main_job.replace("Kernel()", "Kernel(trials=2, steps=2)").replace('"members": 4', '"members": 2'), space)
     cells = pd.DataFrame(space["rows"])
     assert [*zip(cells["model"], cells["N_D"], strict=True)] == [(f"wrong-{i}", n) for i in (1, 2) for n in (4, 8)]
-    assert (cells["H"] < 0.5 * cells["A"]).all()
-    assert space["predictor"].method == "path-drawn"
+    assert (cells["H"] < cells["A"]).all()
+    assert space["predictor"].method == "kernel"
     assert set(space["predictor"].limits) == {"u", "v", "r", *space["runs"].commands, "V_w"}
     assert "wrong-2" in Path("map.html").read_text(encoding="utf-8")
 

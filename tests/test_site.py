@@ -163,7 +163,7 @@ def test_a_command_writes_its_record(records: ModuleType, tmp_path: Path, monkey
 def test_the_grid_of_the_paper_is_drawn_and_counted() -> None:
     """Figures 8, 9 and 10 of a grid with several amounts; sentences count what its rows say."""
     grid = load(DOCS / "paper_grid.py")
-    drawn = grid.figures_page().partition("## `path-drawn`")[2]
+    drawn = grid.figures_page().partition("## `kernel`")[2]
     assert drawn.count("Plotly.newPlot") == 3
     errors = {("moderate-1", 10): 2.0, ("moderate-1", 30): 1.0, ("none", 10): 3.0, ("none", 30): 2.5}
     rows = [{"model": model, "N_D": N_D, "A": 4.0, "H": H, "H_90": 2 * H} for (model, N_D), H in errors.items()]

@@ -36,6 +36,7 @@ NESTED, HELD_OUT, FOLDED = 1, 2, 3
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
 INSTANTS_PER_ROW = 100  # instants asked for each row, from which on every row is one
 COARSE_STEPS = 1.1  # times the step: rows farther apart are no jitter
+GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 LARGEST_MISS = 0.25  # of the way between two rows: where velocities miss more of it, a straight line is safer
 FUTURE_STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
@@ -381,6 +382,22 @@ def choose_evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) ->
         return indices
     places = np.round((np.arange(count) + phase) / count * len(indices) - 0.5).astype(int)
     return np.asarray(indices[places])
+
+
+def part_of_runs(run: NDArray[np.str_], most: int) -> NDArray[np.int64]:
+    """Places of about `most` of the windows (S,), evenly taken from each run, one at least; all where they are few.
+
+    run : name of the run of each window, (S,), in the order of time. Each run begins at another part of a step, so that
+    all moments of alike manoeuvres are seen.
+    """
+    if len(run) <= most:
+        return np.arange(len(run))
+    taken = []
+    for number, name in enumerate(np.unique(run)):
+        mine = np.flatnonzero(run == name)
+        count = max(1, round(len(mine) * most / len(run)))
+        taken.append(choose_evenly(mine, count, (0.5 + number * GOLDEN) % 1.0))
+    return np.sort(np.concatenate(taken))
 
 
 def gaps_of_runs(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:

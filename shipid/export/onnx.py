@@ -68,8 +68,8 @@ def _networks_to_write(predictor: DeployedMethod) -> tuple[list[tuple[Normaliser
         return [(parts[0].normaliser, layers_of_units(*parts), None) for parts in heads], "acceleration"
     if not isinstance(corrector, Compensator):
         raise ShipidError(
-            f"the method {predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "
-            "path-refined, path-trained, calibrator and one-step; export this one to c, fmu or casadi",
+            f"the method {predictor.method} has no networks of its inputs alone: ONNX takes "
+            "path-trained and one-step; export this one to c, fmu or casadi",
             path="--to",
         )
     return [(one.normaliser, one.layers, one.basis) for one in corrector.networks], "compensation"

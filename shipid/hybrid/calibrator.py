@@ -1,6 +1,6 @@
-"""Calibrator: networks that see where the physics says the ship will go, and correct the path by it.
+"""Calibrator: kernel ridge regression that sees where the physics says the ship will go, and corrects the path by it.
 
-[dx, dy] = f(u, v, r, commands, wind, trajectory of the physics), solved as `path-drawn`: x, y in the frame (11), u, v
+[dx, dy] = f(u, v, r, commands, wind, trajectory of the physics), solved as `kernel`: x, y in the frame (11), u, v
 and r of the physics at a few instants of the horizon are inputs, too. After Wang et al. (2021).
 """
 
@@ -13,12 +13,11 @@ import numpy as np
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
-from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
+from shipid.hybrid.kernel import Kernel
+from shipid.hybrid.kernel_compensator import KernelCompensator
 from shipid.hybrid.method import Array
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Needs, Physics
-from shipid.hybrid.search import Scale
 
 TRAJECTORY_SIGNALS = ("x", "y", "u", "v", "r")
 
@@ -46,31 +45,32 @@ class TrajectoryInputs(Inputs):
 
 
 @dataclass(frozen=True)
-class TrajectoryCompensator(Compensator):
+class TrajectoryCompensator(KernelCompensator):
     """A compensator whose inputs hold the trajectory of the physics."""
 
     inputs: TrajectoryInputs
 
 
-class Calibrator(PathDrawn):
-    """`path-drawn` with the trajectory of the physics over the horizon among the inputs.
+class Calibrator(Kernel):
+    """`kernel` with the trajectory of the physics over the horizon among the inputs.
 
-    All other settings are those of `path-drawn`.
+    All other settings are those of `kernel`.
 
     Parameters
     ----------
     moments : at how many instants of the horizon the trajectory is seen, evenly spread, the end among them.
-    physics_scale : how far it must move, in its standard deviations, to change a hidden unit by about one.
     """
 
-    SEARCHED: ClassVar[tuple[str, ...]] = (*PathDrawn.SEARCHED, "physics_scale")
     needs: ClassVar[Needs] = "motion"
     meets_none: ClassVar[bool] = False
     corrector: ClassVar[type[Any]] = TrajectoryCompensator
 
     moments: PositiveInt = 3
-    physics_scale: Scale = (2.0, 32.0)
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return what a descent chooses: name -> (low, high)."""
+        return super().ranges() | {"physics_scale": self.scale}
 
     def inputs(self, commands: tuple[str, ...]) -> Inputs:
-        """Return which quantities the networks may take, given the names of the command columns."""
+        """Return which quantities the method may take, given the names of the command columns."""
         return TrajectoryInputs(commands, self.memory, self.moments)

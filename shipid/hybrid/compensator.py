@@ -85,7 +85,7 @@ class PathCorrector(StoredData, ABC):
 
 @dataclass(frozen=True)
 class Compensator(PathCorrector):
-    """The mean of some networks: one per fold (`path-trained`), or those of the best trials (`path-drawn`)."""
+    """The mean of some networks, one per fold."""
 
     networks: tuple[Network, ...]
     hyperparameters: Mapping[str, float]

@@ -1,6 +1,6 @@
 """Forest: a random forest of what is known at the instant gives the compensation of the path.
 
-The targets are the errors of the path on polynomials of time, as in `path-drawn`; the trees of scikit-learn are kept as
+The targets are the errors of the path on polynomials of time, as in `kernel`; the trees of scikit-learn are kept as
 plain arrays, so that a predictor does not need it. Breiman (2001); for manoeuvring models: Mei et al. (2019).
 """
 

@@ -9,20 +9,16 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
-from typing import Any, cast
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from shipid.hybrid.compensator import Compensator, Network, flatten_paths
-from shipid.hybrid.features import Inputs, input_group
-from shipid.hybrid.method import FitResult, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.ridge import part_of_runs
+from shipid.hybrid.features import Inputs
+from shipid.hybrid.method import FitResult, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.search import (
     Search,
     SearchMethod,
@@ -30,14 +26,12 @@ from shipid.hybrid.search import (
     seed_of,
     suggested_points,
     trial_row,
-    windows_of_folds,
 )
-from shipid.hybrid.training import Learner, Length, StackTraining, train_units
+from shipid.hybrid.training import Learner, Length, StackTraining
 from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
 """Model and number."""
-PARTS = 3  # of the folds: with one for each fold Adam soon finds what only they have in common
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
 
@@ -187,48 +181,3 @@ def _gather_trials(running: list[_RunningStack]) -> dict[Trial, tuple[float, int
         )
         for trial, folds in ended.items()
     }
-
-
-def train_drawn(task: Task, method: Any, drawn: Mapping[str, FitResult]) -> dict[str, FitResult]:
-    """Train the hidden weights of drawn networks; output weights are solved in closed form at every step.
-
-    Variable projection (Golub and Pereyra, 1973), but of the error on runs left out: each step deals the folds anew
-    into `PARTS`, and predicts each part by output weights solved without it. What solves them is learned by heart.
-
-    method : a `PathRefined`. drawn : foundation -> what `path-drawn` gives.
-    """
-    windows, refined = windows_of_folds(task), dict(drawn)
-    rows = part_of_runs(task.windows.run[windows], method.search_windows)
-    for key, table in shared_tables(task, method.inputs(task.commands)).items():
-        fit, start, networks = drawn[key], time.process_time(), []
-        if fit.corrector is None:
-            continue
-        corrector = cast(Compensator, fit.corrector)
-        for row, network in zip(best_trials(fit.trials), corrector.networks, strict=False):
-            left_out = method.left_out(row["params"])
-            taken = {name: values[windows] for name, values in table.items() if input_group(name) not in left_out}
-            seen = VaryingInputs.of(taken, bool(row["params"]["mirror"]))
-            values, mirror = seen.normaliser.apply(taken), seen.reflection
-            mirrors = [np.eye(values.shape[1]), *([] if mirror is None else [mirror])]
-            outputs = flatten_paths(np.tensordot(network.basis.T, task.targets[key][:, windows], 1))
-            dealt = _deal_folds(task.folds, windows[rows], method.epochs, seed_of(task.seed, row["number"]))
-            rate, ridge = method.learning_rate, row["params"]["ridge"]
-            layers = train_units(network.layers[0], mirrors, values, outputs, rows, dealt, rate, ridge)
-            networks.append(replace(network, layers=layers))
-        seconds = fit.seconds + time.process_time() - start
-        corrector = replace(corrector, networks=tuple(networks))
-        refined[key] = replace(fit, corrector=corrector, seconds=seconds, left_out=None)
-    return refined
-
-
-def _deal_folds(
-    folds: Sequence[tuple[Index, Index]], windows: Index, epochs: int, seed: int
-) -> Iterator[list[tuple[Tensor, Tensor]]]:
-    """Masks (S,) of the windows that train, and of those that are judged, for each part of every epoch."""
-    training, judged = (np.stack([np.isin(windows, fold[side]) for fold in folds]) for side in (0, 1))
-    generator = np.random.default_rng(seed)
-    for _ in range(epochs):
-        parts = np.array_split(generator.permutation(len(folds)), min(PARTS, len(folds)))
-        yield [
-            (torch.from_numpy(training[one].all(axis=0)), torch.from_numpy(judged[one].any(axis=0))) for one in parts
-        ]

@@ -14,9 +14,9 @@ import torch
 from scipy.optimize import minimize
 from torch import Tensor
 
+from shipid.data.windows import part_of_runs
 from shipid.hybrid.compensator import unflatten_paths
 from shipid.hybrid.kernel_compensator import (
-    GROUPS,
     KernelCompensator,
     KernelMember,
     bell_values,
@@ -26,11 +26,11 @@ from shipid.hybrid.kernel_compensator import (
     with_constant,
 )
 from shipid.hybrid.method import Array, Index, Row, Task
-from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_folds
 from shipid.hybrid.units import VaryingInputs
 
 PRIOR = 0.1  # weight of the squared distance from the start of a descent, in logarithms, where one run is seen
+TINY = np.finfo(float).tiny  # in place of the squared error where the physics misses nothing
 FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, one more descent leaves none out
 
 
@@ -79,7 +79,7 @@ class KernelProblem(PathProblem):
         seen = self.windows[np.bincount(others, minlength=self.windows[-1] + 1)[self.windows] == len(hidden)]
         folds = [fold for fold in self.task.folds if id(fold) not in out]
         rows = seen[part_of_runs(self.task.windows.run[seen], self.method.search_windows)]
-        idle = {f"{group}_scale" for group in GROUPS} - {*self.scales}
+        idle = {name for name in point if name.endswith("_scale")} - {*self.scales}
         ranges, point = ({k: v for k, v in table.items() if k not in idle} for table in (self.method.ranges(), point))
         blocks, names = FoldBlocks(folds, rows, self.task.device), list(ranges)
         prior = PRIOR / len(np.unique(self.task.windows.run[rows]))
@@ -103,7 +103,7 @@ class KernelProblem(PathProblem):
             by_input -= (bell.sum((0, 1)) + bell.sum((0, 2))) @ z**2 / 2
             slopes = dict(zip(groups, -2 * of_group @ by_input, strict=True))
             slopes |= {"linear": by_linear.sum(), "ridge": settings["ridge"] * by_ridge}
-            value, away = float((missed**2).sum()), logs - start
+            value, away = float((missed**2).sum()) or TINY, logs - start
             slope_of_logs = np.array([float(slopes[name]) for name in names])
             return np.log(value) + prior * away @ away, slope_of_logs / value + 2 * prior * away
 
@@ -152,9 +152,10 @@ class KernelProblem(PathProblem):
                 outputs = unflatten_paths(paths.cpu().numpy())
                 errors[:, judged] = self.targets[:, judged] - np.tensordot(self.basis, outputs, 1)
         self.left_out = errors if self.parts > 1 else None
-        return KernelCompensator(
+        made: KernelCompensator = self.method.corrector(
             self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[0][0]
         )
+        return made
 
 
 def mirror_sums(sides: Tensor) -> Tensor:

@@ -120,7 +120,7 @@ class FitResult:
 
     corrector : None where every trial failed.
     trials : a row each: number, params, value (mean squared validation error [m^2]), epochs, seconds, state
-        (`complete`, `stopped` where some of the windows alone judged it, or `diverged`).
+        (`complete`, `stopped` where a race ended it, or `diverged`).
     seconds : time spent on this foundation, its share of what is done for several at once.
     left_out : errors (T, S, 2) [m], true less predicted, by models that saw the run of the window neither in training
         nor in the choice of hyperparameters; not numbers where there are none. None: `refits` of `shipid.predictor.fit`
@@ -242,7 +242,7 @@ NEEDED: dict[Needs, str] = {
 def misfit_words(method: Method, gives: Sequence[Needs], vessel: Vessel | None) -> str:
     """Why a method cannot work with physics that gives this; empty where it can."""
     if method.needs not in gives:
-        return f"the method needs {NEEDED[method.needs]}: take one that works on the path, such as kernel or path-drawn"
+        return f"the method needs {NEEDED[method.needs]}: take one that works on the path, such as kernel"
     return "" if vessel is None else method.unfit(vessel)
 
 

@@ -16,8 +16,6 @@ from shipid.hybrid.learned_force import LearnedForce
 from shipid.hybrid.method import Method, fault_of_method
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
-from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.path_refined import PathRefined
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
 from shipid.hybrid.regression import Regression
@@ -33,12 +31,12 @@ METHODS |= {
     "learned-force": LearnedForce,
     "modules": Modules,
     "one-step": OneStep,
-    "path-drawn": PathDrawn,
-    "path-refined": PathRefined,
     "path-trained": PathTrained,
     "recurrent": Recurrent,
     "regression": Regression,
 }
+
+RETIRED = ("path-drawn", "path-refined")
 
 
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
@@ -51,6 +49,8 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
 
 def method_names(kind: str) -> str:
     """Return the names of the methods that there are, as the remedy where `kind` is none of them."""
+    if kind in RETIRED:
+        return "it is retired, take kernel"
     remedy = "one that you wrote needs its package, or `--with` the file that puts it into METHODS"
     return f"{suggest_name(kind, METHODS.names)} ({remedy})"
 

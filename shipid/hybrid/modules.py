@@ -184,7 +184,7 @@ class Modules(StepMethod):
     ----------
     trials : sets of hyperparameters tried per foundation, each with 6 ridges.
     units : drawn hidden units; 0 leaves constants alone.
-    motion_scale, command_scale, offset : as in `path-drawn`.
+    motion_scale, command_scale, offset : as in `one-step`.
     ridge : weight of the squared weights of the hidden units; the constants have a hundredth of it.
     limit : greatest departure of a factor from 1, below 1.
     centres : moments of training that the alarm keeps, at most.

@@ -96,7 +96,9 @@ class OneStep(StepMethod):
     ----------
     trials : sets of hyperparameters tried per foundation.
     units : hidden units of tanh; in mirrored pairs where the inputs have a mirror.
-    motion_scale, command_scale, wind_scale, offset : as in `path-drawn`.
+    motion_scale, command_scale, wind_scale : how far an input must move, in its standard deviations, to change a hidden
+        unit by about one.
+    offset : spread of the offsets of the hidden units: large bends more.
     ridge : weight of the squared output weights beside the mean squared error of the accelerations, each axis by its
         standard deviation; each trial takes the best of 8.
     averaged : the accelerations are the mean of the networks of so many best trials.

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Inputs, Memory
+from shipid.hybrid.features import Memory
 from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.search import Probability, Scale, SearchMethod
 
@@ -68,5 +68,5 @@ class PathTrained(SearchMethod):
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
         from shipid.hybrid.training import Length
 
-        inputs, length = Inputs(task.commands, self.memory), Length(self.epochs, self.batch, self.patience)
-        return tune_gradient(task, self, inputs, length, self.at_once)
+        length = Length(self.epochs, self.batch, self.patience)
+        return tune_gradient(task, self, self.inputs(task.commands), length, self.at_once)

@@ -30,7 +30,7 @@ Point = Mapping[str, Any]
 TrialWorth = tuple[float, Point, int]
 """Mean squared validation error [m^2] per coordinate of a trial, all its settings, and its epochs."""
 Any_ = TypeVar("Any_")
-TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
+TIMED_TRIALS = 4  # first trials from whose time the number of all follows
 CLOSING_TRIALS = 1  # trials that the last fit costs, about
 
 
@@ -67,10 +67,14 @@ class SearchMethod(Method):
         """What a study compares this method by: its settings `mirror`, `memory` and `terms`, where it has such."""
         mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
         return Traits(
-            mirror > 0 if isinstance(mirror, bool | float) else None,
+            mirror if isinstance(mirror, bool) else None,
             memory if isinstance(memory, Memory) else NO_MEMORY,
             terms if isinstance(terms, int) else None,
         )
+
+    def inputs(self, commands: tuple[str, ...]) -> Inputs:
+        """Return which quantities the method may take, given the names of the command columns."""
+        return Inputs(commands, self.traits.memory)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high)."""
@@ -126,40 +130,29 @@ def seed_of(*entropy: int | str) -> int:
     return int(np.random.SeedSequence(words).generate_state(1)[0])
 
 
-def affordable_trials(
-    budget: float, before: float, seconds: Sequence[float], closing: int = CLOSING_TRIALS
-) -> int | None:
+def affordable_trials(budget: float, before: float, seconds: Sequence[float]) -> int | None:
     """How many trials fit into a budget; None before enough have been timed, or half of the budget is gone.
 
     budget : core-seconds for everything. before : what the search has cost before its first trial [s].
     seconds : of the trials so far; the first one also warms up, so the others tell the price.
-    closing : trials that what follows the search costs, about.
     """
     if not seconds or (len(seconds) < TIMED_TRIALS and before + sum(seconds) < budget / 2):
         return None
     price = max(fmean(seconds[1:] or seconds), 1e-6)
-    return max(len(seconds), int((budget - before) / price) - closing)
+    return max(len(seconds), int((budget - before) / price) - CLOSING_TRIALS)
 
 
 class Search:
     """The trials of one or several foundations that go trial by trial together.
 
-    names : the foundations. closing : as in `affordable_trials`.
+    names : the foundations.
     again : each trial needs what the one before left behind, so nothing is taken over from an interrupted search but
         its number of trials.
     rows : foundation -> its trials so far, those of an interrupted search first.
     """
 
-    def __init__(
-        self,
-        task: Task,
-        names: Iterable[str],
-        method: SearchMethod,
-        *,
-        again: bool = False,
-        closing: int = CLOSING_TRIALS,
-    ) -> None:
-        self.begun, self.closing = time.process_time(), closing
+    def __init__(self, task: Task, names: Iterable[str], method: SearchMethod, *, again: bool = False) -> None:
+        self.begun = time.process_time()
         self.method, self.journal = method, task.journal
         self.cells = {name: task.cells.get(name, name) for name in names}
         self.rows: dict[str, list[Row]] = {name: [] for name in self.cells}
@@ -213,7 +206,7 @@ class Search:
         assert self.method.budget is not None
         seconds = [sum(rows[k]["seconds"] for rows in self.rows.values()) for k in range(done)]
         before = time.process_time() - self.begun if self.before is None else self.before
-        self.count = affordable_trials(self.method.budget * len(self.rows), before, seconds, self.closing)
+        self.count = affordable_trials(self.method.budget * len(self.rows), before, seconds)
         if self.count is not None and self.journal is not None:
             self.journal.add({cell: [self.count] for cell in self.cells.values()})
 
@@ -368,7 +361,7 @@ class PathProblem(SearchProblem):
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
         super().__init__(method, task, name)
-        self.inputs = Inputs(task.commands, method.memory)
+        self.inputs = method.inputs(task.commands)
         self.table = self.inputs.table(self.case.physics, self.instants)
         self.basis = smooth_basis(task.windows.horizon, method.terms)
         self.weights = np.tensordot(self.basis.T, self.targets, 1)

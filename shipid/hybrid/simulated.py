@@ -127,7 +127,7 @@ class SimulatedPhysics(Physics):
         return {"x": x, "y": y, **{name: states[name] for name in MOTION if name in states}}
 
 
-REMEDY = "take a method that works on the path, such as kernel or path-drawn"
+REMEDY = "take a method that works on the path, such as kernel"
 
 
 @dataclass(frozen=True)

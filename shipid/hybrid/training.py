@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 from torch import Tensor
 
 from shipid.hybrid.compensator import Layers
-from shipid.hybrid.method import Array, Index
+from shipid.hybrid.method import Array
 
 Stack = Sequence[tuple[Tensor, Tensor]]
 Shapes = Mapping[str, tuple[int, ...]]
@@ -234,63 +234,6 @@ class Adam:
         spread = self.second.sqrt().mul_((1 - BETA_2**self.count) ** -0.5).add_(EPSILON)
         self.weights.mul_(1 - rate * self.decay)
         self.weights.addcdiv_(self.first * rate, spread, value=-1 / (1 - BETA_1**self.count))
-
-
-def train_units(
-    layer: tuple[Array, Array],
-    mirrors: Sequence[Array],
-    values: Array,
-    outputs: Array,
-    rows: Index,
-    dealt: Iterable[Sequence[tuple[Tensor, Tensor]]],
-    learning_rate: float,
-    ridge: float,
-) -> Layers:
-    """Train the weight (d, M) and offset (M,) of hidden units, a step of Adam for each list of parts.
-
-    The output weights of a step are solved with a ridge [m^2] on a part, and judged by another; in the end, on all.
-
-    mirrors : (d, d) of inputs, the identity first, for each block of the units; with two, x is made of even units, y of
-        odd ones. values, outputs : (S, d), normalised, and (S, 2 r) [m]. rows : windows that train.
-    dealt : masks of these rows, of the windows that solve and of those that judge.
-    """
-    sides = [torch.from_numpy(values @ mirror) for mirror in mirrors]
-    targets = torch.from_numpy(outputs).chunk(len(mirrors), dim=1)
-    first = [torch.from_numpy(part).chunk(len(mirrors), dim=-1)[0] for part in layer]
-    weights = torch.cat([part.flatten() for part in first])[None]
-    leaves = [leaf.requires_grad_() for leaf in split_layers(weights, [part.shape for part in first])]
-    adam, size = Adam(weights, [0.0]), len(layer[1]) ** 0.5
-
-    def weighed(rows: Index | slice) -> Iterator[tuple[Tensor, Tensor]]:
-        """Features (S, M) and what they make, for x and y."""
-        units = [torch.tanh(side[rows] @ leaves[0][0] + leaves[1]) / size for side in sides]
-        parts = units if len(units) == 1 else [units[0] + units[1], units[0] - units[1]]
-        return zip(parts, [side[rows] for side in targets], strict=True)
-
-    with threadpool_limits(1):
-        for parts in dealt:
-            errors = [
-                made[judged] @ _ridge_solution(made[rest], wanted[rest], ridge * len(rows) / len(values))
-                - wanted[judged]
-                for made, wanted in weighed(rows)
-                for rest, judged in parts
-            ]
-            gradients = torch.autograd.grad(torch.cat(errors).square().sum(), leaves)
-            with torch.no_grad():
-                adam.step(torch.cat([one.flatten() for one in gradients])[None], torch.tensor([[learning_rate]]))
-        solved = [_ridge_solution(made, wanted, ridge).detach().numpy() / size for made, wanted in weighed(slice(None))]
-    weight, offset = (leaf[0].detach().numpy() for leaf in leaves)
-    blocks = [solved, *([one, -other] for one, other in [solved][: len(mirrors) - 1])]
-    last = np.concatenate([np.concatenate(block, axis=1) for block in blocks])
-    inner = np.concatenate([mirror @ weight for mirror in mirrors], axis=1)
-    return (inner, np.tile(offset, len(mirrors))), (last, np.zeros(last.shape[1]))
-
-
-def _ridge_solution(features: Tensor, targets: Tensor, ridge: float) -> Tensor:
-    """Weights (M, K) of features (S, M) that minimise |targets - features W|^2 + ridge |W|^2."""
-    gram = features.T @ features + ridge * torch.eye(features.shape[1], dtype=features.dtype)
-    solved: Tensor = torch.linalg.solve(gram, features.T @ targets)
-    return solved
 
 
 class BestEpochs:

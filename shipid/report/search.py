@@ -34,11 +34,6 @@ MEDIAN_BINS = 9  # of the middle line
 WIDE_RANGE = 3.0  # largest / smallest value from which an axis is logarithmic
 HIGHEST_RATIO, DIVERGED_RATIO = 4.0, 5.0  # times the best of the cell: farther off is drawn here, and what diverged
 HYPERPARAMETER_UNITS = {"delays": "s"}  # others have none
-# The kinds of memory that a trial may have, by number.
-MEMORY_WORDS = (
-    "none", "the error of the physics", "that and history", "estimates of the observer", "everything",
-    "history", "the error of the physics and estimates of the observer", "history and estimates of the observer",
-)  # fmt: skip
 STATES_OF_TRIALS = {  # outcome of a trial -> its name in the legend, marker and colour; the first is drawn smaller
     "complete": ("trial", "circle", MUTED),
     "stopped": ("stopped early", "triangle-up", category_colour(4)),
@@ -53,10 +48,8 @@ def search_figure(content: ReportContent) -> PageFigure | None:
     if not names or frame.empty:
         return None
     counts = figure_sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
-    early = "triangles are those that a part of the windows judged, and that were not among the best; "
+    early = "triangles are those that a race ended early; "
     thinned = f"of many, at most {MOST_DOTS:,} are drawn in a panel; "
-    tried = sorted({int(kind) for kind in frame.memory.dropna()}) if "memory" in names else []
-    memories = f" Memory: {', '.join(f'{kind} {MEMORY_WORDS[kind]}' for kind in tried)}." if tried else ""
     return PageFigure(
         id="search",
         title="Trials of the search",
@@ -67,7 +60,7 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         + "diamonds are those that the cell uses; those beyond "
         f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians. "
         "Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
-        f"what rises or falls throughout, not an optimum in the middle.{memories}",
+        "what rises or falls throughout, not an optimum in the middle.",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
         draw=lambda size="all": [

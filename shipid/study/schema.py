@@ -249,7 +249,7 @@ class Study(Strict):
     split: Split
     prediction: Prediction
     grid: Grid
-    method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
+    method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="kernel", kind="kernel")]
     claims: Claims | None = None
     published: PublishedEnvelope | None = None
     cost: Cost | None = None

@@ -21,7 +21,7 @@ from shipid.plugins import TRIED_FILES, add_members, added_members, import_files
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in which a forkserver has its socket
-PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"]
+PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.kernel_ridge"]
 """Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
 NO_GUARD = 64  # exit status of a worker whose script starts workers: EX_USAGE of sysexits.h
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import

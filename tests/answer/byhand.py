@@ -64,10 +64,10 @@ def by_hand(
     for (model, N_D, seed), H in cells.items():
         A = alone.get(model, np.nan)
         row = {
-            "cell": f"{model}+drawn-{N_D}-{seed}",
+            "cell": f"{model}+kernel-{N_D}-{seed}",
             "model": model,
             "foundation": model,
-            "method": "drawn",
+            "method": "kernel",
             "family": model if family is None else model.partition("-")[0],
             "member": 0,
             "N_D": N_D,

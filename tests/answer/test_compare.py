@@ -27,7 +27,7 @@ Made = Callable[..., Results]
 def other_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tiny study with another method, more seeds, fewer amounts and a longer horizon."""
     folder = tmp_path_factory.mktemp("other")
-    changes = {"method.0.name": "mine", "method.0.units": 9, "grid.N_D": [4], "prediction.ahead": 6.0}
+    changes = {"method.0.name": "mine", "method.0.steps": 3, "grid.N_D": [4], "prediction.ahead": 6.0}
     run_here(tiny_plan(folder, changes), folder / "run")
     return folder / "run"
 
@@ -38,19 +38,19 @@ def placed(results: Results, name: str) -> Results:
 
 def test_cells_of_runs_on_the_disk(tiny_run: Path, other_run: Path) -> None:
     """The means are those of the cells; windows that one run lacks are left out in both."""
-    comparison = compare([tiny_run, other_run], {"drawn": "mine"})
+    comparison = compare([tiny_run, other_run], {"kernel": "mine"})
     assert len(comparison.names) == 2
     assert set(comparison.documents["path"]) == {
-        "method.drawn.name",
-        "method.drawn.units",
+        "method.kernel.name",
+        "method.kernel.steps",
         "grid.N_D",
         "prediction.ahead",
     }
     assert list(comparison.errors["N_D"].unique()) == [0, 4], "6 is in one of them"
-    assert set(comparison.errors["method"]) == {"alone", "drawn ~ mine"}
+    assert set(comparison.errors["method"]) == {"alone", "kernel ~ mine"}
     assert comparison.errors.set_index(["family", "N_D"]).loc[("wrong", 4), "cells"] == 2
     assert any("on the 60 windows of both" in note for note in comparison.notes), comparison.notes
-    whole = compare([other_run, tiny_run], {"mine": "drawn"}).errors  # turned round
+    whole = compare([other_run, tiny_run], {"mine": "kernel"}).errors  # turned round
     turned = 100 / (1 + comparison.errors["difference"] / 100) - 100
     np.testing.assert_allclose(whole["difference"], turned, atol=1e-9)
     np.testing.assert_allclose(whole["first"], comparison.errors["other"])
@@ -71,7 +71,7 @@ def test_paired_differences_by_hand(made: Made) -> None:
     """Errors are hard * H with hard 0.9 to 1.1 over manoeuvres: a difference of means, and what training adds."""
     one, other = (made(grid({**H, "bad": bad}), runs=8) for bad in ((2.0, 1.5), (1.0, 1.5 + 1e-6)))
     comparison = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "method", "N_D"])
-    row = comparison.loc[("bad", "drawn", 10)]
+    row = comparison.loc[("bad", "kernel", 10)]
     assert row[["first", "other", "difference"]].tolist() == pytest.approx([2.0, 1.0, -50.0])
     assert row[["first_end", "other_end"]].tolist() == pytest.approx([2.0, 1.0])
     assert row["first_end_90"] == pytest.approx(2.0 * np.quantile(np.linspace(0.9, 1.1, 8), 0.9))
@@ -80,7 +80,7 @@ def test_paired_differences_by_hand(made: Made) -> None:
     assert [row["low"], row["high"]] == pytest.approx(
         [100 * (0.5 * np.exp(side * 2.3646 * noise) - 1) for side in (-1, 1)], rel=1e-3
     )
-    same = comparison.loc[("bad", "drawn", 30)]
+    same = comparison.loc[("bad", "kernel", 30)]
     assert same["difference"] == pytest.approx(0, abs=1e-3)
     assert same["low"] < 0 < same["high"], "alike, but trained apart: only what is equal to the digit is identical"
     assert same["verdict"] == ""
@@ -145,22 +145,22 @@ def test_seeds_are_those_of_the_document(made: Made) -> None:
 
 def test_the_command(tiny_run: Path, other_run: Path, tmp_path: Path) -> None:
     folders = [str(tiny_run), str(other_run)]
-    shown = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "drawn=mine"])
+    shown = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "kernel=mine"])
     assert shown.exit_code == 0, shown.output
     lines = [" ".join(line.split()) for line in shown.output.splitlines()]
-    assert "method.drawn.units 8 9" in lines
-    assert any(" wrong drawn ~ mine 4 2 " in line for line in lines)
+    assert "method.kernel.steps 2 3" in lines
+    assert any(" wrong kernel ~ mine 4 2 " in line for line in lines)
     assert any(
         line.startswith("other run family method N_D cells") and line.endswith("difference 95 % from to verdict")
         for line in lines
     )
     table = tmp_path / "rows.csv"
     result = CliRunner().invoke(
-        app, ["study", "compare", *folders, "--pair", "drawn=mine", "--json", "--out", str(table)]
+        app, ["study", "compare", *folders, "--pair", "kernel=mine", "--json", "--out", str(table)]
     )
     document: dict[str, Any] = json.loads(result.stdout)
     assert {"folders", "documents", "errors", "notes", "file"} == set(document)
     assert document["errors"][0]["low"] is None, "four manoeuvres have no interval"
     assert len(table.read_text().splitlines()) == 1 + len(document["errors"])
-    wrong = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "drawn"])
+    wrong = CliRunner().invoke(app, ["study", "compare", *folders, "--pair", "kernel"])
     assert isinstance(wrong.exception, DocumentError)

@@ -48,7 +48,7 @@ def test_the_error_at_the_horizon_is_that_of_the_last_step(made: Any) -> None:
     results = made(grid(H), curves={("good", 10, 0): [0.0, 0.0, 0.0, 10.0]}, runs=8)
     table = error_table(results, ["good"], "H_end")
     assert table.mean("good", 0) == pytest.approx(10.0)
-    assert table.mean("good", 0) == pytest.approx(results.cells.set_index("cell").loc["good+drawn-10-0", "H_end"])
+    assert table.mean("good", 0) == pytest.approx(results.cells.set_index("cell").loc["good+kernel-10-0", "H_end"])
     assert error_table(results, ["good"]).mean("good", 0) == pytest.approx(2.5)
 
 

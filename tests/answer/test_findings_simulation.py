@@ -27,7 +27,7 @@ H = {
     "none": (8.0, 4.0, 1.0),
 }
 ROUGH, SMOOTH = [0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 2.0, 3.0]
-JAGGED = {"method": [{"name": "drawn", "kind": "path-trained"}]}  # no polynomial of time
+JAGGED = {"method": [{"name": "kernel", "kind": "path-trained"}]}  # no polynomial of time
 Rows = Mapping[str, Sequence[float | None]]
 
 

@@ -14,7 +14,7 @@ from shipid.answer import frames
 from shipid.answer.pages import report_content
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.hybrid.bands import Region
-from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.kernel import Kernel
 from shipid.study import store
 from shipid.study.results import Results, read_results
 from tests.answer.byhand import grid
@@ -129,7 +129,7 @@ def test_the_report_does_not_depend_on_when_a_log_was_recorded(read: Results) ->
 
 def test_physics_alone_is_not_said_to_have_data(made: Any) -> None:
     methods = [
-        {"name": "drawn", "kind": "path-drawn", "families": ["bad"]},
+        {"name": "kernel", "kind": "kernel", "families": ["bad"]},
         {"name": "alone", "kind": "alone", "families": ["good"]},
     ]
     read = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods})
@@ -162,16 +162,16 @@ def test_a_diverged_model_is_marked_and_left_out_of_curves(read: Results) -> Non
 
 def test_trials_know_the_chosen_one(read: Results) -> None:
     frame = frames.trials_frame(read)
-    assert len(frame) == 8
+    assert len(frame) == 16
     assert frame["chosen"].all()
-    assert frame.columns[10:].tolist() == [*PathDrawn().varied()]
+    assert frame.columns[10:].tolist() == [*Kernel().varied()]
     first = read.rows[0]
     two = [{**first["trials"][0], "number": k, "value": value} for k, value in enumerate((2.0, 1.0))]
     two.append({**two[0], "number": 2, "state": "diverged", "value": None})
     two += [{**two[0], "number": number, "value": None} for number in (3, 4)]  # not a number: it ended in a traceback
-    for averaged, chosen in ((1, [False, True, *[False] * 3]), (8, [True, True, *[False] * 3])):
+    for trials, chosen in ((1, [False, True, *[False] * 3]), (8, [True, True, *[False] * 3])):
         (way,) = read.plan.methods
-        plan = replace(read.plan, methods=(replace(way, method=way.method.model_copy(update={"averaged": averaged})),))
+        plan = replace(read.plan, methods=(replace(way, method=way.method.model_copy(update={"trials": trials})),))
         frame = frames.trials_frame(replace(read, plan=plan, cells=pd.DataFrame([{**first, "trials": two}])))
         assert frame["chosen"].tolist() == chosen
     assert frame["value"].tolist() == pytest.approx([2.0, 1.0, *[np.nan] * 3], nan_ok=True)

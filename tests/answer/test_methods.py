@@ -29,7 +29,7 @@ def cells(
         for family, members in (("moderate", 2), ("none", 1)):
             for member in range(members):
                 hard = rng.uniform(1.0, 4.0, runs)
-                for method, more in (("drawn", 0.0), ("other", effect)):
+                for method, more in (("kernel", 0.0), ("other", effect)):
                     error = hard + more + noise * rng.standard_normal(runs)
                     one = CellErrors(f"{family}-{member}", error, windows, trained, str(world))
                     rows.append(
@@ -47,29 +47,29 @@ def row(frame: pd.DataFrame, method: str = "other", family: str = WITH_PHYSICS) 
 
 def test_the_difference_is_that_of_the_means() -> None:
     made = cells(np.random.default_rng(0), 0.5)
-    table = method_table(made, "drawn")
+    table = method_table(made, "kernel")
     assert list(table.columns) == METHOD_COLUMNS
     for family in ("moderate", "none"):
         mine = made[made.family.eq(family)].groupby("method")
         logs = mine["errors"].apply(lambda cells: np.mean([np.log(one.errors).mean() for one in cells]))
-        ratio = np.exp(logs["other"] - logs["drawn"])
+        ratio = np.exp(logs["other"] - logs["kernel"])
         assert row(table, family=family).difference == pytest.approx(100 * (ratio - 1))
         assert pytest.approx(mine.H.mean()["other"]) == row(table, family=family).H
-    assert row(table, "drawn").difference == 0
+    assert row(table, "kernel").difference == 0
     assert row(table).pairs == 4
     assert row(table).runs == 24  # 12 runs of each world, whatever the number of members
     assert row(table).worlds == 2
     assert row(table).least <= row(table).difference <= row(table).greatest
     assert np.isnan(row(table).world_low)
-    assert row(method_table(cells(np.random.default_rng(0), 0.5, worlds=4), "drawn")).world_low < 60
+    assert row(method_table(cells(np.random.default_rng(0), 0.5, worlds=4), "kernel")).world_low < 60
 
 
 def test_a_family_that_saw_the_test_is_shown_and_not_in_the_mean() -> None:
     made = cells(np.random.default_rng(0), 0.5)
     tuned = made[made.family.eq("moderate")].assign(family="tuned", H=lambda rows: 0.1 * rows.H, apart=True)
-    table = method_table(pd.concat([made, tuned], ignore_index=True), "drawn")
+    table = method_table(pd.concat([made, tuned], ignore_index=True), "kernel")
     for key in ("H", "difference", "cells", "missing"):
-        assert getattr(row(table), key) == getattr(row(method_table(made, "drawn")), key)
+        assert getattr(row(table), key) == getattr(row(method_table(made, "kernel")), key)
     assert pytest.approx(0.1 * row(table).H) == row(table, family="tuned").H
 
 
@@ -79,10 +79,10 @@ def test_another_training_is_in_the_interval() -> None:
     for _ in range(60):
         made = cells(rng, 0.0, worlds=1, noise=0.01, trained=True)
         moved = [replace(one, errors=rng.normal(1.0, 0.03) * one.errors) for one in made["errors"]]
-        one = row(method_table(made.assign(errors=moved, H=[cell.mean for cell in moved]), "drawn"))
+        one = row(method_table(made.assign(errors=moved, H=[cell.mean for cell in moved]), "kernel"))
         free += one.high < 0 or one.low > 0
     assert free <= 9, "5 % of 60, but for one time in a thousand"
-    alike = row(method_table(cells(rng, 0.0, worlds=1, noise=0.0, trained=True), "drawn"))
+    alike = row(method_table(cells(rng, 0.0, worlds=1, noise=0.0, trained=True), "kernel"))
     assert (alike.low, alike.high) == (0.0, 0.0)
 
 
@@ -92,15 +92,15 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     made.loc[worst, "status"] = "diverged"
     made.loc[worst, ["H", "H_90", "H_end", "H_end_90"]] = np.nan
     made.at[worst, "errors"] = None
-    one = row(method_table(made, "drawn"))
+    one = row(method_table(made, "kernel"))
     assert (one.failed, one.cells, one.pairs) == (1, 4, 3)
     assert np.isfinite([one.H, one.difference, one.low, one.high]).all()
-    assert row(method_table(made, "drawn"), "drawn").failed == 0
-    assert (one.missing, row(method_table(made, "drawn"), "drawn").missing) == (1, 0)
-    apart = row(method_table(made.drop(worst), "drawn"))
+    assert row(method_table(made, "kernel"), "kernel").failed == 0
+    assert (one.missing, row(method_table(made, "kernel"), "kernel").missing) == (1, 0)
+    apart = row(method_table(made.drop(worst), "kernel"))
     assert (apart.failed, apart.cells, apart.missing) == (0, 3, 1), "the method does not run on this model"
     every = made.assign(status=np.where(made.method.eq("other"), "failed", made.status))
-    lost = row(method_table(every, "drawn"))
+    lost = row(method_table(every, "kernel"))
     assert lost.failed == lost.cells
     assert lost.pairs == 0
     assert np.isnan(lost.H)
@@ -114,10 +114,10 @@ def test_a_study_of_several_worlds_has_an_interval_over_them(worlds: int, condit
     for condition in names:
         for world in range(worlds):
             for family, share in (("moderate", 0.5), ("none", 1.0)):
-                row = {"condition": condition, "world": f"{condition}-{world}", "family": family, "method": "drawn"}
+                row = {"condition": condition, "world": f"{condition}-{world}", "family": family, "method": "kernel"}
                 rows += [{**row, "N_D": N, "status": "ok", "H_end": share * 2.0**world / N} for N in (1, 2, 3)]
     study = SimpleNamespace(
-        repeat={"seed": [*range(worlds)]}, claims=SimpleNamespace(method="drawn", not_judged=set()), model=[]
+        repeat={"seed": [*range(worlds)]}, claims=SimpleNamespace(method="kernel", not_judged=set()), model=[]
     )
     plan: Any = SimpleNamespace(study=study, methods=[])
     told = sentences_on_worlds(plan, pd.DataFrame(rows))

@@ -25,7 +25,7 @@ from tests.study.tiny import events_here, run_here, tiny_plan, without_figures
 
 
 def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
-    methods = [{"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "families": ["right", "wrong"]}]
+    methods = [{"name": "kernel", "kind": "kernel", "trials": 1, "steps": 2, "families": ["right", "wrong"]}]
     plan, folder = tiny_plan(tmp_path, {"method": methods, "grid.N_D": [4]}), tmp_path / "run"
     with without_figures():
         run_here(plan, folder)

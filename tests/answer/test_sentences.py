@@ -125,14 +125,14 @@ def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
 
 
 def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
-    methods = [{"name": "drawn", "kind": "path-drawn", "families": ["good", "bad"]}]
+    methods = [{"name": "kernel", "kind": "kernel", "families": ["good", "bad"]}]
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
     assert "8 s ahead, good (best in validation) with 30 runs errs by 1.00 m" in advice
     assert "It is unknown whether physics harms, since not every cell without physics has a result." in advice
 
 
 def test_methods_without_physics_are_answered_with_their_errors(made: Any) -> None:
-    methods = [{"name": name, "kind": "path-drawn", "families": ["none"]} for name in ("drawn", "other")]
+    methods = [{"name": name, "kind": "kernel", "families": ["none"]} for name in ("kernel", "other")]
     methods += [{"name": "alone", "kind": "alone"}]
     results = made(grid({"none": (4.0, 3.0)}), changes={"method": methods}, claims=None, planned=8)
     (row,) = results.cells[results.cells["N_D"] == 30].to_dict("records")
@@ -347,7 +347,7 @@ def test_bounds_are_those_that_the_study_covers() -> None:
 def test_the_comparison_of_methods_comes_next(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
     plain = [sentence for sentence, _ in answer_sentences(results, ["Memory errs least."])]
-    monkeypatch.setattr("shipid.answer.sentences.learning_methods", lambda _: ["drawn", "memory"])
+    monkeypatch.setattr("shipid.answer.sentences.learning_methods", lambda _: ["kernel", "memory"])
     sentences = [sentence for sentence, _ in answer_sentences(results, ["Memory errs least."])]
     assert sentences[1] == "Memory errs least.", "after the error at the horizon"
     assert [one for one in sentences if one != sentences[1] and "methods that learn" not in one] == plain

@@ -101,12 +101,12 @@ def test_a_member_weighs_once_and_a_failed_cell_nothing() -> None:
     """A of a family is the mean over its members, however many cells each has; what is identified has no one A."""
     columns = ["foundation", "family", "method", "N_D", "status", "A", "H", "coverage", "width"]
     rows: list[tuple[Any, ...]] = [
-        ("f-1", "f", "drawn", 4, "ok", 1.0, 0.6, 0.8, 2.0),
-        ("f-1", "f", "drawn", 6, "ok", 1.0, 0.5, 0.9, 1.5),
-        ("f-2", "f", "drawn", 4, "ok", 3.0, 1.0, 0.6, 4.0),
-        ("f-2", "f", "drawn", 6, "failed", 3.0, 99.0, 0.0, 99.0),
-        ("i", "i", "drawn", 4, "ok", 7.0, 0.2, 0.9, 1.0),
-        ("none", "none", "drawn", 4, "ok", 50.0, 9.0, np.nan, np.nan),
+        ("f-1", "f", "kernel", 4, "ok", 1.0, 0.6, 0.8, 2.0),
+        ("f-1", "f", "kernel", 6, "ok", 1.0, 0.5, 0.9, 1.5),
+        ("f-2", "f", "kernel", 4, "ok", 3.0, 1.0, 0.6, 4.0),
+        ("f-2", "f", "kernel", 6, "failed", 3.0, 99.0, 0.0, 99.0),
+        ("i", "i", "kernel", 4, "ok", 7.0, 0.2, 0.9, 1.0),
+        ("none", "none", "kernel", 4, "ok", 50.0, 9.0, np.nan, np.nan),
     ]
     plan = SimpleNamespace(foundations=[SimpleNamespace(family="i", fitted=True)])
     worlds: Any = [SimpleNamespace(cells=pd.DataFrame(rows, columns=columns), plan=plan)] * 2

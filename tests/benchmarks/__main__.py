@@ -18,7 +18,6 @@ from shipid.study.run import machine
 from tests.benchmarks.compare import RECORDED, TOLERANCE, Ratio, accepted, best, compare, read_recorded
 
 THREADS = {  # group, the module of that name -> threads that PyTorch may use
-    "limits": 1,
     "rollouts": 2,
     "gradient": 2,
     "screening": 2,

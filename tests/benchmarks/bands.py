@@ -22,8 +22,8 @@ from shipid.hybrid.alone import Alone
 from shipid.hybrid.bands import Bands, Region, runs_needed, track_directions
 from shipid.hybrid.calibration import calibrate_bands
 from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.method import Case, Corrector, Method, Task
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.identification.bands import band_refusal
 from shipid.identification.bands import measure_bands as of_manoeuvres
@@ -44,7 +44,7 @@ from tests.study.tiny import whole_unit
 
 Array = np.ndarray
 SHARES = (0.5, 0.8, 0.9, 0.95)
-METHODS: dict[str, Method] = {"alone": Alone(), "drawn": PathDrawn(trials=8, units=48, averaged=4)}
+METHODS: dict[str, Method] = {"alone": Alone(), "kernel": Kernel()}
 VESSEL = "gunnerus-28.9"
 
 
@@ -180,8 +180,8 @@ def worlds(
         for size in (*amounts, *((5, 10, 50) if seed % every == 0 else ())):
             for label, method in METHODS.items():
                 physics = made.physics
-                if label == "drawn" and seed % 3 == 2:
-                    physics, label = Physics(None, physics.horizon, physics.step), "drawn, no physics"
+                if label == "kernel" and seed % 3 == 2:
+                    physics, label = Physics(None, physics.horizon, physics.step), "kernel, no physics"
                 one = cell(made, runs[:size], method, physics, seed)
                 keys = {
                     "world": seed,
@@ -241,9 +241,9 @@ FAMILIES = [
     {"name": "template", "base": "gunnerus-33.9-template"},
 ]
 WAYS = [
-    {"name": "drawn", "kind": "path-drawn"},
+    {"name": "kernel", "kind": "kernel"},
     {"name": "alone", "kind": "alone"},
-    {"name": "memory", "kind": "path-drawn", "memory": {"history": [2, 4, 8], "error": 8}},
+    {"name": "memory", "kind": "kernel", "memory": {"history": [2, 4, 8], "error": 8}},
 ]
 
 

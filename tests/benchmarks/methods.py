@@ -1,4 +1,4 @@
-"""`path-drawn` against the yardstick `path-trained`: the same cells, each tuned alone, on worlds not chosen on."""
+"""`kernel` against the yardstick `path-trained`: the same cells, each tuned alone, on worlds not chosen on."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.method import Case, Method, Task
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summarise_errors
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import PreparedStudy, instants_of, obtain_runs, physics_of, prepare
 from shipid.study.run import run_unit
 from tests.study.tiny import physics_errors, whole_unit
 
-DRAWN = PathDrawn()
 KEPT = Path(__file__).with_name("yardstick.json")  # `path-trained` on cells of worlds that no method was chosen on
 
 
@@ -35,7 +34,7 @@ class Cell:
 @cache
 def world(number: int) -> tuple[Plan, PreparedStudy]:
     """The study `simulation` in a world: its plan and all that its cells need."""
-    plan = read_plan("simulation", {"seed": number, "method": [{"name": "drawn", "kind": "path-drawn"}]})
+    plan = read_plan("simulation", {"seed": number, "method": [{"name": "kernel", "kind": "kernel"}]})
     return plan, prepare(plan, obtain_runs(plan))
 
 
@@ -61,28 +60,30 @@ def tune_cell(plan: Plan, prepared: PreparedStudy, cell: Cell, method: Method) -
 
 
 def run() -> dict[str, Any]:
-    """Core-seconds and errors of each cell of the yardstick by the drawn path, and the ratios of the means."""
-    pairs = [(kept, _drawn(Cell(kept["world"], kept["N_D"], kept["model"]))) for kept in json.loads(KEPT.read_text())]
+    """Core-seconds and errors of each cell of the yardstick by the kernel, and the ratios of the means."""
+    pairs = [
+        (kept, _by_kernel(Cell(kept["world"], kept["N_D"], kept["model"]))) for kept in json.loads(KEPT.read_text())
+    ]
     result: dict[str, Any] = {"cells": len(pairs)}
-    for kept, drawn in pairs:
+    for kept, made in pairs:
         name = f"world {kept['world']}, N_D {kept['N_D']}, {kept['model']}"
-        result[f"{name}: core-seconds, trained / drawn"] = f"{kept['core_seconds']:.0f} / {drawn['core_seconds']:.1f}"
-        result[f"{name}: H, trained / drawn [m]"] = f"{kept['H']:.2f} / {drawn['H']:.2f}"
+        result[f"{name}: core-seconds, trained / kernel"] = f"{kept['core_seconds']:.0f} / {made['core_seconds']:.1f}"
+        result[f"{name}: H, trained / kernel [m]"] = f"{kept['H']:.2f} / {made['H']:.2f}"
     for key, label in (("core_seconds", "time"), ("H", "mean H"), ("H_90", "mean H_90")):
         counted = pairs if key == "core_seconds" else [pair for pair in pairs if not pair[0]["extrapolated"]]
-        trained, drawn = (np.array([pair[side][key] for pair in counted]) for side in (0, 1))
+        trained, made = (np.array([pair[side][key] for pair in counted]) for side in (0, 1))
         result |= {
             f"{label}, trained": round(float(trained.mean()), 3),
-            f"{label}, drawn": round(float(drawn.mean()), 3),
+            f"{label}, kernel": round(float(made.mean()), 3),
         }
-        result[f"{label}, drawn / trained"] = round(float(drawn.mean() / trained.mean()), 4)
+        result[f"{label}, kernel / trained"] = round(float(made.mean() / trained.mean()), 4)
         if key != "core_seconds":
-            result[f"{label}: drawn is better in"] = f"{int((drawn < trained).sum())} of {len(counted)}"
+            result[f"{label}: kernel is better in"] = f"{int((made < trained).sum())} of {len(counted)}"
     return result | _in_company(pairs[0][0]["world"])
 
 
-def _drawn(cell: Cell) -> dict[str, Any]:
-    return tune_cell(*world(cell.world), cell, DRAWN)
+def _by_kernel(cell: Cell) -> dict[str, Any]:
+    return tune_cell(*world(cell.world), cell, Kernel())
 
 
 def _in_company(number: int) -> dict[str, Any]:

@@ -24,8 +24,8 @@ import numpy as np
 import torch
 
 from shipid.answer.start import event_line
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.method import FitResult, Task
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import run as study
 from shipid.study.plan import Plan, Unit, read_plan
 from shipid.study.prepare import PreparedStudy, obtain_runs, prepare
@@ -33,13 +33,13 @@ from tests.benchmarks.timing import best_of, clock
 
 CELL = 1.0  # s
 WORKERS = (1, 2)
-LIGHT = {"trials": 1, "averaged": 1, "units": 16}
+LIGHT = {"trials": 1, "steps": 1, "search_windows": 20, "centres": 20}
 ONE = {"repeat": {}, "grid.seeds": [0]}  # world, and draw of the runs
 KNOWN = {**ONE, "grid.N_D": [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]}  # 60 cells
-REAL = {**ONE, "grid.N_D": [30], "grid.seeds": list(range(10)), "method.0.trials": 30}
+REAL = {**ONE, "grid.N_D": [30], "grid.seeds": list(range(10))}
 PRODUCT, PRODUCTS = 1500, 40  # order of the matrices, and how many products each of two tasks is
 
-run_unit, drawn_fit = study.run_unit, PathDrawn.fit
+run_unit, kernel_fit = study.run_unit, Kernel.fit
 
 
 def run() -> dict[str, Any]:
@@ -74,13 +74,13 @@ def overhead() -> dict[str, Any]:
 
 def known_unit(plan: Plan, prepared: PreparedStudy, unit: Unit, device: str, trials: Path | None = None) -> Any:
     """As `run_unit`, with cells that take a known time."""
-    with patch.object(PathDrawn, "fit", _known_fit):
+    with patch.object(Kernel, "fit", _known_fit):
         return run_unit(plan, prepared, unit, device, trials)
 
 
-def _known_fit(method: PathDrawn, task: Task) -> dict[str, FitResult]:
+def _known_fit(method: Kernel, task: Task) -> dict[str, FitResult]:
     begun = time.thread_time()
-    tuned = drawn_fit(method.model_copy(update=LIGHT), task)
+    tuned = kernel_fit(method.model_copy(update=LIGHT), task)
     a = np.ones((64, 64))
     while time.thread_time() - begun < CELL * len(task.cases):
         a @ a

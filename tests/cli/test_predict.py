@@ -18,7 +18,7 @@ def test_predict_on_a_raw_log(tmp_path: Path, tiny_run: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ShipidError, match=r"needs this command; the data have propeller\.n"):
         output_of(
-            *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", read_rows(tiny_run)["cell"].iloc[0]),
+            *("predict", tiny_run, BAD / "logs" / "good.csv", "--cell", "right+kernel-N0004-s0"),
             *("--mapping", BAD / "logs" / "plain.toml"),
         )
 

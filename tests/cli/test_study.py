@@ -82,7 +82,7 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     with without_workers(), without_figures():
         text = output_of("study", "resume", folder, "--workers", "1")
     assert "missing: computed again" in text
-    assert "4 of 8 cells to do" in text
+    assert "1 of 8 cells to do" in text
     assert output_of("study", "check", folder).strip() == "8 of 8 cells finished, 0 faults"
 
     cell = next(name for name in read_rows(folder)["cell"] if re.match(r"none\b.*-N0004-s0$", name))
@@ -98,12 +98,12 @@ def test_an_incomplete_folder_has_a_provisional_report(tmp_path: Path, tiny_run:
 
     folder = tmp_path / "run"
     shutil.copytree(tiny_run, folder)
-    (folder / "batches" / "N0004-s0.json").unlink()
-    (folder / "seals" / "N0004-s0.sha256").unlink()
+    (folder / "batches" / "none+kernel-N0004-s0.json").unlink()
+    (folder / "seals" / "none+kernel-N0004-s0.sha256").unlink()
     with without_figures():
         output_of("study", "report", folder)
-    assert (folder / "answer.txt").read_text().startswith("4 of 8 cells are not finished")
-    assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 4
+    assert (folder / "answer.txt").read_text().startswith("1 of 8 cells are not finished")
+    assert len(pd.read_parquet(folder / "results.parquet")["cell"].unique()) == 7
 
 
 @pytest.mark.parametrize(("folder", "typed"), [("mine", "mine"), ("-my run", "'./-my run'")])

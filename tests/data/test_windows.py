@@ -19,6 +19,7 @@ from shipid.data.windows import (
     join_windows,
     nested_runs,
     part_folds,
+    part_of_runs,
     run_folds,
     split_folds,
     to_frame,
@@ -407,3 +408,23 @@ def test_windows_over_a_time_without_rows_are_found() -> None:
     np.testing.assert_array_equal(over, (windows.run == "a") & (windows.t > 10) & (windows.t < 30))
     assert gaps_of_runs(dataset, 10.0) == {}  # a step of the prediction as long
     assert gaps_of_runs(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_windows_are_taken_evenly_from_each_run(seed):
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, 60, rng.integers(1, 12))
+    run = np.repeat([f"run {number}" for number in range(len(lengths))], lengths)
+    most = int(rng.integers(1, 2 * len(run)))
+    taken = part_of_runs(run, most)
+    if len(run) <= most:
+        np.testing.assert_array_equal(taken, np.arange(len(run)))
+        return
+    assert (np.diff(taken) > 0).all()
+    counts = np.array([(run[taken] == name).sum() for name in np.unique(run)])
+    shares = np.array([(run == name).sum() for name in np.unique(run)]) * most / len(run)
+    assert (counts >= 1).all()
+    assert (np.abs(counts - np.maximum(shares, 1)) <= 0.5).all()
+    for name in np.unique(run):
+        steps = np.diff(taken[run[taken] == name])
+        assert len(steps) == 0 or np.ptp(steps) <= 1

@@ -10,7 +10,7 @@ from shipid.data.windows import Instants
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.bands import Bands, FastMotion, fast_power
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
-from shipid.hybrid.compensator import Compensator, Network, Normaliser
+from shipid.hybrid.compensator import Compensator, Network, Normaliser, smooth_basis
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
 from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import HankelCorrector, LinearLaw
@@ -22,7 +22,6 @@ from shipid.hybrid.one_step import OneStepCorrector, OutputWeights
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
 from shipid.hybrid.regression import RegressionCorrector, law_terms
-from shipid.hybrid.ridge import smooth_basis
 from shipid.hybrid.stepping import MISSED_NAMES
 from shipid.hybrid.units import Units
 from shipid.observer import ESTIMATE_COLUMNS, Observer
@@ -33,7 +32,7 @@ from tests.conftest import ENVELOPE, SPEEDS, pace, variety
 
 KINDS = (
     *("alone", "calibrator", "forest", "hankel-dmd", "learned-force", "modules"),
-    *("one-step", "path-drawn", "path-trained", "recurrent", "kernel", "regression"),
+    *("one-step", "path-trained", "recurrent", "kernel", "regression"),
 )
 STEPPED = ("hankel-dmd", "modules", "one-step", "regression")  # corrected by step: they refuse an observer
 NEEDS_PHYSICS = ("alone", "calibrator", "learned-force", "modules")
@@ -115,7 +114,7 @@ def remembering(physics, memory, instants, seed=2, **more):
     table = inputs.table(physics, instants)
     network = network_of(np.random.default_rng(seed), list(table), table, physics.horizon, 2, False)
     corrector = Compensator(inputs, (network,), {})
-    return Predictor(physics, "path-drawn", corrector, **{"limits": {"u": (-99.0, 99.0)}, **more})
+    return Predictor(physics, "path-trained", corrector, **{"limits": {"u": (-99.0, 99.0)}, **more})
 
 
 def bands_of(rng, physics, instants, names, slow):
@@ -273,13 +272,13 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
     taken = [name for name in table if rng.random() < 0.7 and (not name.endswith("_rw") or name in wind)]
     taken = taken or ["u", "r"]
     terms = int(rng.integers(1, horizon + 1))
-    if kind in ("path-drawn", "path-trained", "calibrator"):
+    if kind == "path-trained":
         networks = []
         for _ in range(int(rng.integers(1, 4))):
             fewer = [name for name in taken if rng.random() < 0.8] or taken
             networks.append(network_of(rng, fewer, table, horizon, terms, rng.random() < 0.5))
-        return (TrajectoryCompensator if kind == "calibrator" else Compensator)(inputs, tuple(networks), {})
-    if kind == "kernel":
+        return Compensator(inputs, tuple(networks), {})
+    if kind in ("kernel", "calibrator"):
         normaliser, count = _normaliser(taken, table), int(rng.integers(1, 40))
         centres = normaliser.apply(table)[rng.integers(size, size=count)]
         members = tuple(
@@ -289,7 +288,8 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
             for _ in range(int(rng.integers(1, 4)))
         )
         reflection = _signs(rng, len(taken)) if rng.random() < 0.6 else None
-        return KernelCompensator(inputs, normaliser, reflection, smooth_basis(horizon, terms), centres, members, {})
+        made, basis = TrajectoryCompensator if kind == "calibrator" else KernelCompensator, smooth_basis(horizon, terms)
+        return made(inputs, normaliser, reflection, basis, centres, members, {})
     if kind == "forest":
         values = np.stack([table[name] for name in taken], axis=1)
         trees = _trees(rng, values, terms)

@@ -64,7 +64,7 @@ def agrees(predictor, instants, folder):
 
 
 def test_a_drawn_predictor_has_the_band_of_python(tmp_path):
-    strange = drawn("path-drawn", 5, vessel="mariner")
+    strange = drawn("path-trained", 5, vessel="mariner")
     assert agrees(strange.predictor, strange.instants, tmp_path)
 
 

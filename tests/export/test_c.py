@@ -85,7 +85,7 @@ def agrees(strange, folder):
     np.testing.assert_allclose(computed[:, sound][:, whole], expected[:, whole], rtol=0, atol=NEAR * scale)
 
 
-@pytest.mark.parametrize("kind", ["forest", "path-drawn", "recurrent"])
+@pytest.mark.parametrize("kind", ["forest", "path-trained", "recurrent"])
 def test_a_drawn_predictor_is_that_of_python(kind, tmp_path):
     agrees(drawn(kind, 5, vessel="mariner"), tmp_path)
 
@@ -98,7 +98,7 @@ def test_every_method_is_that_of_python_on_strange_ships(kind, seed, tmp_path):
 
 
 def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
-    strange = drawn("path-drawn", 3, vessel="mariner")
+    strange = drawn("path-trained", 3, vessel="mariner")
     exported = build_model(strange.predictor)
     loaded = library(predictor_files(exported, "odd"), tmp_path)
     given = {

@@ -14,7 +14,7 @@ from shipid.hybrid.features import feature_table
 from tests.export.strange import drawn
 
 
-@pytest.mark.parametrize("kind", ["calibrator", "one-step", "path-drawn", "path-trained"])
+@pytest.mark.parametrize("kind", ["one-step", "path-trained"])
 def test_networks_run_elsewhere(kind, tmp_path):
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
@@ -37,6 +37,6 @@ def test_networks_run_elsewhere(kind, tmp_path):
 
 def test_what_has_no_networks_is_refused_in_one_line(tmp_path):
     """Before the package onnx is asked for."""
-    with pytest.raises(ShipidError, match="ONNX takes path-drawn"):
+    with pytest.raises(ShipidError, match="ONNX takes path-trained and one-step"):
         export_predictor(drawn("alone", 5, vessel="mariner").predictor, "onnx", tmp_path / "a.onnx")
     assert build_model(drawn("alone", 5, vessel="mariner").predictor).layout.now

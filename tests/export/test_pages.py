@@ -47,7 +47,7 @@ def blocks(page: str, language: str) -> list[str]:
 @pytest.mark.slow
 def test_the_loop_in_c_predicts_with_a_band(tmp_path: Path) -> None:
     loop, banded = blocks("export-c.md", "c")
-    predictor = drawn("path-drawn", 3, vessel="gunnerus-28.9").predictor
+    predictor = drawn("path-trained", 3, vessel="gunnerus-28.9").predictor
     predictor.export("c", tmp_path, name="aboard")
     include, begin = loop.index("\n") + 1, loop.index("aboard_init")
     more = f"no_path();\n{banded}    given += isfinite(path[0]) && banded >= 0 ? 1 : 0;\n}}"

@@ -183,7 +183,7 @@ def test_what_is_the_same_function_in_casadi_is_exported(simple, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "place", "value", "message"),
     [
-        ("path-drawn", "networks", [], "'path-drawn' do not fit together"),
+        ("path-trained", "networks", [], "'path-trained' do not fit together"),
         ("one-step", "heads", {}, "'one-step' do not fit together"),
         ("recurrent", "networks.0.layers.b_h", np.zeros(14), "b_h: the arrays of the saved method do not fit together"),
         (
@@ -195,7 +195,7 @@ def test_what_is_the_same_function_in_casadi_is_exported(simple, tmp_path):
         ("hankel-dmd", "past", 1e18, "damaged: a past of 1?[0-9]* steps: 0 to 100000"),
         ("hankel-dmd", "past", -30.0, "damaged: a past of -[0-9]* steps: 0 to 100000"),
         ("hankel-dmd", "law.delays", 1, "'hankel-dmd' do not fit together .past-2.u"),
-        ("path-drawn", "inputs.memory.history", [1e-300], "'path-drawn' do not fit together"),
+        ("path-trained", "inputs.memory.history", [1e-300], "'path-trained' do not fit together"),
     ],
 )
 def test_a_damaged_predictor_is_one_line(kind, place, value, message, tmp_path):

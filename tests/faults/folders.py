@@ -57,7 +57,7 @@ def run_here(plan: Plan, folder: Path, workers: int = 0, **means: Any) -> None:
 
 def searched_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     """Plan of the tiny study with three trials in a search, so that one may be stopped between two of them."""
-    return tiny_plan(folder, {"method.drawn.trials": 3, **(changes or {})})
+    return tiny_plan(folder, {"method.kernel.trials": 3, **(changes or {})})
 
 
 @cache

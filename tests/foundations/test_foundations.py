@@ -43,11 +43,11 @@ mean_of = ["own", "table", "function"]
 """
 METHODS = """
 [[method]]
-name = "drawn"
-kind = "path-drawn"
-trials = 1
+name = "instant"
+kind = "kernel"
+trials = 2
+steps = 2
 terms = 4
-units = 8
 [[method]]
 name = "kernel"
 kind = "kernel"
@@ -112,7 +112,7 @@ def test_a_moved_folder_resumes_with_its_own_tables_and_with_trust(folder: Path)
 
 
 def test_the_corrector_alone_is_exported_with_the_path_as_an_input(folder: Path, tmp_path: Path) -> None:
-    file = store.cell_file(folder, "table-1+drawn-N0006-s0")
+    file = store.cell_file(folder, "table-1+instant-N0006-s0")
     predictor, results = Predictor.load(file), shipid.read_results(folder)
     predictor.export("casadi", tmp_path / "a.casadi")
     function, test = ca.Function.load(str(tmp_path / "a.casadi")), results.test
@@ -120,9 +120,9 @@ def test_the_corrector_alone_is_exported_with_the_path_as_an_input(folder: Path,
     for k in (0, len(test) - 1):
         given = {name: np.array([test.columns[entry][k] for entry in entries]) for name, entries in names.items()}
         path = function(**{**given, "physics": results.physics["table-1"][:, k].ravel()})["path"]
-        np.testing.assert_allclose(np.array(path).T, results.paths["table-1+drawn-N0006-s0"][:, k], atol=1e-9)
+        np.testing.assert_allclose(np.array(path).T, results.paths["table-1+instant-N0006-s0"][:, k], atol=1e-9)
     for to, cell, words in (
-        ("c", "table-1+drawn", "casadi or onnx writes the corrector alone"),
+        ("c", "table-1+instant", "casadi or onnx writes the corrector alone"),
         ("casadi", "function+kernel", "asks it for more than a path"),
     ):
         with pytest.raises(ShipidError, match=words):
@@ -146,11 +146,11 @@ def predictor_names(file: Path) -> dict[str, list[str]]:
 
 def test_a_saved_predictor_takes_the_paths_of_the_physics(folder: Path) -> None:
     results = shipid.read_results(folder)
-    predictor = Predictor.load(store.cell_file(folder, "function+drawn-N0006-s0"))
+    predictor = Predictor.load(store.cell_file(folder, "function+instant-N0006-s0"))
     with pytest.raises(ShipidError, match="the physics is my_ship:simulate, which is not in the file"):
         predictor.predict(results.test.instants())
     paths = predictor.predict(results.test.instants(), results.physics["function"])
-    np.testing.assert_allclose(paths, results.paths["function+drawn-N0006-s0"], atol=1e-12)
+    np.testing.assert_allclose(paths, results.paths["function+instant-N0006-s0"], atol=1e-12)
 
 
 def test_a_study_has_the_digits_of_a_task_by_hand(tmp_path: Path) -> None:

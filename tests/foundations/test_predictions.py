@@ -22,7 +22,7 @@ from tests.foundations.test_function import FAMILY
 from tests.study.test_score import FAULTS
 
 TABLE = '[[family]]\nname = "table"\npredictions = "paths.parquet"\n'
-METHOD = '[[method]]\nname = "drawn"\nkind = "path-drawn"\nmemory = {error = [2.0]}\n'
+METHOD = '[[method]]\nname = "kernel"\nkind = "kernel"\nmemory = {error = [2.0]}\n'
 
 
 @pytest.fixture(scope="module")

@@ -12,15 +12,13 @@ from tests.hybrid.worlds import World, ship, world
 
 #: settings that make slow methods quick; the laws hold for any
 QUICK: dict[str, dict[str, Any]] = {
-    "calibrator": {"trials": 3, "units": 24, "averaged": 2},
+    "calibrator": {"trials": 2, "steps": 4, "search_windows": 40, "centres": 60},
     "forest": {"trials": 2, "trees": 6},
     "hankel-dmd": {"delays": (2.0, 4.0)},
     "kernel": {"trials": 2, "steps": 4, "search_windows": 40, "centres": 60},
     "learned-force": {"trials": 2, "units": 4, "iterations": 4},
     "modules": {"trials": 2, "units": 4, "centres": 16, "ridge": 1e-3},
     "one-step": {"trials": 2, "units": 16, "averaged": 2},
-    "path-drawn": {"trials": 3, "units": 24, "averaged": 2, "search_windows": 40},
-    "path-refined": {"trials": 3, "units": 24, "averaged": 2, "search_windows": 40, "epochs": 2},
     "path-trained": {"trials": 2, "epochs": 20, "units": 8, "layers": 1, "input_dropout": 0.0, "hidden_dropout": 0.0},
     "recurrent": {"trials": 2, "epochs": 3, "units": 6, "seconds": 4.0},
 }

@@ -13,6 +13,13 @@ from shipid.hybrid.method import Case, FitResult, Method, Task
 from shipid.hybrid.physics import Physics
 
 Array = np.ndarray
+TWINS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
+RUDDER = ("engine.n", "rudder.delta")
+STEPS, LENGTHS = 9, (18, 25, 18, 30, 11, 18)  # windows of the runs
+ALL = np.arange(sum(LENGTHS))
+ENDS = np.cumsum(LENGTHS)
+RUNS = [np.arange(end - length, end) for length, end in zip(LENGTHS, ENDS, strict=True)]
+FOLDS = [(np.setdiff1d(ALL, run), run) for run in RUNS]
 
 
 def azimuth_columns() -> dict[str, Array]:
@@ -63,3 +70,28 @@ def tune(
 def compensation(corrector: Compensator, columns: Mapping[str, Array]) -> Array:
     """Compensation (T, S, 2) [m] for columns at instants."""
     return corrector.compensation(corrector.inputs.table(Physics(None, 1, 1.0), Instants(columns)))
+
+
+def drawn_columns(commands: Sequence[str] = TWINS, seed: int = 0, count: int = len(ALL)) -> dict[str, Array]:
+    """Columns that are mirrored nowhere, all different."""
+    rng = np.random.default_rng(seed)
+    columns = {name: rng.normal(0.5, 1.0, count) for name in ("psi", "u", "v", "r", "beta_w", *commands)}
+    return columns | {"V_w": rng.uniform(1.0, 9.0, count)}
+
+
+def mirrored_columns(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """The ship and the wind as a mirror shows them."""
+    sides, images = {"port": "starboard", "starboard": "port"}, {}
+    for name, values in columns.items():
+        component, _, signal = name.rpartition(".")
+        odd = signal in ("psi", "v", "r", "beta_w", "alpha", "delta")
+        images[f"{sides.get(component, component)}.{signal}" if component else name] = -values if odd else values
+    return images
+
+
+def missed_paths(columns: Mapping[str, Array]) -> Array:
+    """What the physics misses (T, S, 2) [m]: smooth in time, a function of motion and orders."""
+    t = np.arange(1.0, STEPS + 1)[:, None] / STEPS
+    x = t * columns["u"] + 2.0 * t**2 * np.tanh(columns["port.n"])
+    y = t * columns["v"] - 1.5 * t**2 * columns["r"]
+    return np.stack([x, y], axis=-1)

@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from shipid.errors import DataError
-from shipid.hybrid.compensator import Compensator, Network
+from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, choose_features, feature_table
 from shipid.hybrid.units import VaryingInputs
 from tests.hybrid.tasks import azimuth_columns, compensation
@@ -46,3 +46,17 @@ def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
         x, y = h[:, :4].numpy().T, h[:, 4:].numpy().T  # (12): all dx, then all dy
         expected.append(np.stack([network.basis @ x, network.basis @ y], axis=-1))
     np.testing.assert_allclose(compensation(compensator, columns), np.mean(expected, axis=0), atol=1e-10)
+
+
+@pytest.mark.parametrize(("horizon", "terms"), [(30, 8), (15, 1), (50, 12), (2, 8), (1, 8)])
+def test_shapes_are_orthonormal_and_hold_all_polynomials_from_0(horizon, terms):
+    basis = smooth_basis(horizon, terms)
+    assert basis.shape == (horizon, min(terms, horizon))
+    np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-12)
+    t = np.arange(1, horizon + 1) / horizon
+    powers = t[:, None] ** np.arange(1, basis.shape[1] + 1)
+    np.testing.assert_allclose(basis @ (basis.T @ powers), powers, atol=1e-12)
+    if terms < horizon - 1:
+        above = t ** (terms + 1)
+        assert np.abs(basis @ (basis.T @ above) - above).max() > 1e-10
+        assert np.abs(basis @ (basis.T @ np.ones(horizon)) - 1.0).max() > 1e-3  # an error starts from 0

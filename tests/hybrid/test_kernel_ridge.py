@@ -14,8 +14,7 @@ from shipid.hybrid import kernel_ridge
 from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.kernel_ridge import FoldBlocks, KernelProblem
 from shipid.hybrid.method import Task
-from tests.hybrid.tasks import task_of
-from tests.hybrid.test_ridge import ALL, FOLDS, RUNS, TWINS, drawn, missed
+from tests.hybrid.tasks import ALL, FOLDS, RUNS, TWINS, drawn_columns, missed_paths, task_of
 
 NAMES = np.repeat([f"run-{place}" for place in range(len(RUNS))], [len(run) for run in RUNS])
 SMALL = Kernel(trials=2, steps=4, terms=4)
@@ -23,8 +22,8 @@ SMALL = Kernel(trials=2, steps=4, terms=4)
 
 def given(folds: list = FOLDS, targets: np.ndarray | None = None) -> Task:
     """A task of six runs."""
-    columns = drawn()
-    task = task_of(columns, TWINS, {"one": missed(columns) if targets is None else targets}, folds, 3)
+    columns = drawn_columns()
+    task = task_of(columns, TWINS, {"one": missed_paths(columns) if targets is None else targets}, folds, 3)
     return replace(task, windows=replace(task.windows, run=NAMES))
 
 
@@ -90,7 +89,11 @@ def test_errors_of_runs_left_out_are_those_of_refits(centres: int) -> None:
 @pytest.mark.parametrize(("folds", "trials"), [(FOLDS, 2), (FOLDS[:4], 2), (FOLDS[:3], 3), (FOLDS[:2], 3)])
 def test_no_run_has_a_part_in_the_settings_that_predict_it(folds: list, trials: int) -> None:
     """Other errors in the runs that a trial does not see: its settings stay; those of another do not."""
-    method, spoilt, parts = SMALL.model_copy(update={"trials": trials}), missed(drawn()), min(trials, len(folds))
+    method, spoilt, parts = (
+        SMALL.model_copy(update={"trials": trials}),
+        missed_paths(drawn_columns()),
+        min(trials, len(folds)),
+    )
     spoilt[:, np.concatenate(RUNS[0 : len(folds) : parts])] *= -3.0
     first, second = (method.fit(given(folds, targets))["one"] for targets in (None, spoilt))
     assert first.trials[0]["params"] == second.trials[0]["params"]

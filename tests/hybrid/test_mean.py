@@ -72,12 +72,10 @@ def test_a_mean_predicts_the_mean_and_comes_back_from_its_file(tmp_path) -> None
     here = small_world()
     doubtful = replace(here.physics, vessel=ship().with_values({"hull.derivatives.X_u|u|": -3000.0}))
     cases = {"physics": here.physics, "doubtful": doubtful}
-    fitted = fit_all(quick("path-drawn"), here.task(cases))
-    parts = tuple(DeployedMethod(cases[name], "path-drawn", fitted[name].corrector) for name in cases)
+    fitted = fit_all(quick("kernel"), here.task(cases))
+    parts = tuple(DeployedMethod(cases[name], "kernel", fitted[name].corrector) for name in cases)
     weights = np.array([0.3, 0.7])
-    predictor = Predictor(
-        here.physics, "path-drawn", MeanCorrector(parts, weights), {"u": (0.0, 9.0)}, commands="known"
-    )
+    predictor = Predictor(here.physics, "kernel", MeanCorrector(parts, weights), {"u": (0.0, 9.0)}, commands="known")
     instants = here.test.instants(known=True)
     paths = [Predictor(one.physics, one.method, one.corrector, commands="known").predict(instants) for one in parts]
     np.testing.assert_allclose(predictor.predict(instants), 0.3 * paths[0] + 0.7 * paths[1], atol=1e-9)

@@ -34,8 +34,6 @@ from tests.hybrid.worlds import HORIZON, World
 LONGER: dict[str, dict[str, Any]] = {
     "hankel-dmd": {"delays": (2.0, 3.0, 4.0)},
     "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12)},
-    "path-drawn": {"trials": 3, "search_windows": 1000},
-    "path-refined": {"trials": 3, "search_windows": 1000},
     DOCUMENTED: {},
 }
 documented = pytest.fixture(autouse=True)(list_documented)
@@ -130,11 +128,10 @@ def test_the_sampler_learns_from_the_trials_before(here: World) -> None:
     assert params[0][11:] != params[1][11:]
 
 
-@pytest.mark.parametrize("kind", ["path-drawn", "one-step", "path-trained"])
+@pytest.mark.parametrize("kind", ["one-step", "path-trained"])
 def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World, tmp_path, monkeypatch) -> None:
     """Whatever the clock says the second time: what was decided is written down."""
-    file = tmp_path / "trials.log"
-    method = longer(kind, budget=100.0) if kind != "path-drawn" else longer(kind, budget=100.0, averaged=1)
+    file, method = tmp_path / "trials.log", longer(kind, budget=100.0)
     monkeypatch.setattr(searches, "affordable_trials", lambda *known: 2 if known[-1] else None)
     first = method.fit(task_in(here, kind, open_journal(file)))
     assert {len(fit.trials) for fit in first.values()} == {2}
@@ -142,8 +139,7 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
     second = method.fit(task_in(here, kind, open_journal(file)))
     assert digits(second, here, kind) == digits(first, here, kind)
     assert open_journal(file).count("a+way-N0006-s2") == 2
-    named = longer(kind, trials=2).model_copy(update={"averaged": 1} if kind == "path-drawn" else {})
-    assert digits(named.fit(task_in(here, kind, None)), here, kind) == digits(first, here, kind)
+    assert digits(longer(kind, trials=2).fit(task_in(here, kind, None)), here, kind) == digits(first, here, kind)
 
 
 def test_a_price_is_that_of_the_trials_after_the_first() -> None:

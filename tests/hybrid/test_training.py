@@ -111,38 +111,6 @@ def test_a_stack_does_not_notice_that_it_is_trained_in_parts(problem):
     np.testing.assert_array_equal(stack.losses(), whole.losses())
 
 
-def solved_error(x, y, weight, offset, ridge):
-    """Mean squared error of each third of the samples, by output weights of drawn units that the others solve."""
-    features = np.tanh(x @ weight + offset) / len(offset) ** 0.5
-    missed = []
-    for part in np.split(np.arange(96), 3):
-        rest = np.setdiff1d(np.arange(96), part)
-        gram = features[rest].T @ features[rest] + ridge * np.eye(len(offset))
-        missed.append(features[part] @ np.linalg.solve(gram, features[rest].T @ y[rest]) - y[part])
-    return np.square(missed).mean()
-
-
-def test_a_step_moves_hidden_units_against_the_gradient_of_the_error_on_what_is_left_out(problem):
-    """The first step of Adam moves each weight by the learning rate, against the sign of its slope."""
-    x, y = problem[0][:96], problem[1][0, :96]
-    rng, rate, ridge = np.random.default_rng(0), 1e-3, 0.03
-    weight, offset = rng.normal(size=(5, 7)), rng.normal(size=7)
-    part = torch.arange(96) // 32
-    dealt = [[(part != k, part == k) for k in range(3)]]
-    (moved, shifted), (last, _) = training.train_units(
-        (weight, offset), [np.eye(5)], x, y, np.arange(96), dealt, rate, ridge
-    )
-    for new, old, place in ((moved, weight, (2, 3)), (moved, weight, (0, 6)), (shifted, offset, (4,))):
-        near = [weight.copy(), offset.copy(), weight.copy(), offset.copy()]
-        for copy, step in ((near[old is offset], 1e-5), (near[2 + (old is offset)], -1e-5)):
-            copy[place] += step
-        slope = solved_error(x, y, *near[:2], ridge) - solved_error(x, y, *near[2:], ridge)
-        assert new[place] - old[place] == pytest.approx(-rate * np.sign(slope), rel=1e-3)
-    features = np.tanh(x @ moved + shifted) / 7**0.5  # in the end all samples solve
-    expected = np.linalg.solve(features.T @ features + ridge * np.eye(7), features.T @ y)
-    np.testing.assert_allclose(last * 7**0.5, expected, rtol=1e-8)
-
-
 @pytest.mark.parametrize("rate", [0.1, 0.5, 0.999])
 def test_drop_out_is_that_of_torch_bit_by_bit(rate):
     one, other = torch.Generator().manual_seed(3), torch.Generator().manual_seed(3)

@@ -107,19 +107,14 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
 
 
-def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
+def test_delays_are_seconds(simulation):
     trials = simulation.trials.drop(columns=["learning_rate", "weight_decay", "units"])
-    trials = trials.assign(delays=2.0 + trials.number.mod(3), memory=trials.number.mod(3).astype(float))
+    trials = trials.assign(delays=2.0 + trials.number.mod(3))
     content = replace(simulation, trials=trials)
-    assert {panel.layout.xaxis.title.text for panel in views(search(content))["0"]} == {
-        "delays [s]",
-        "memory [1]",
-    }
+    assert {panel.layout.xaxis.title.text for panel in views(search(content))["0"]} == {"delays [s]"}
     assert all(
         "%{x:.3g} s" in dot.hovertemplate for name, dot in dots(panels(content)["delays"]).items() if name != "median"
     )
-    assert search(content).how.endswith(" Memory: 0 none, 1 the error of the physics, 2 that and history.")
-    assert "Memory:" not in search(simulation).how
 
 
 def test_trials_that_all_diverged_stand(simulation):

@@ -13,7 +13,7 @@ from shipid.data.windows import cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.features import Memory
-from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.predictor import Predictor, fit
@@ -187,7 +187,7 @@ def test_runs_that_trained_and_physics_that_diverges_are_said(banded, tmp_path):
 
 
 def test_a_log_without_an_input_of_the_training_is_one_line_with_its_file(tmp_path):
-    file = drawn("path-drawn", 6, vessel="gunnerus-28.9").predictor.save(tmp_path / "cell.npz")
+    file = drawn("kernel", 6, vessel="gunnerus-28.9").predictor.save(tmp_path / "cell.npz")
     rows = log().rename(columns={"propeller.n": "port.n", "rudder.delta": "port.alpha"})
     rows = rows.assign(**{"starboard.n": rows["port.n"], "starboard.alpha": rows["port.alpha"], "t": np.arange(60.0)})
     with pytest.raises(DataError, match=r"log.parquet: phi: the compensator needs this column"):
@@ -269,10 +269,10 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
 
 
 def test_a_log_without_the_past_that_is_needed_is_one_line(tmp_path):
-    file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 4 s
+    file = drawn("kernel", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 1 s
     target = saved(log().assign(V_w=0.0, beta_w=0.0, phi=0.0), tmp_path)
     assert len(play_aboard(file, target, every=3.0).instants)
-    with pytest.raises(DataError, match="no instant has the past of 4 s that the predictor needs"):
+    with pytest.raises(DataError, match="no instant has the past of 1 s that the predictor needs"):
         play_aboard(file, target, every=1e4)
 
 
@@ -305,7 +305,7 @@ def test_a_heading_that_wraps_changes_no_prediction():
     assert np.abs(np.diff(wrapped["psi"])).max() > 6
     data, turned = (Dataset(one, {"clock": "run", "flags": []}) for one in (frame, wrapped))
     windows = cut_windows(data, horizon=4, step=STEP, interval=5.0, past=4)
-    method = PathDrawn(trials=1, units=8, terms=2, memory=Memory(turned=(20.0,)))
+    method = Kernel(trials=1, steps=2, terms=2, memory=Memory(turned=(20.0,)))
     fitted = fit(method, Physics(None, 4, STEP), windows)
     tables = [
         table_of_stretch(fitted, one, run, rows) for one in (data, turned) for run, rows in stretches_of_runs(one)

@@ -49,7 +49,7 @@ def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, m
     """Where the file of a user's method is gone, the check of files gave up, too."""
     folder, changes = tmp_path / "run", {"method": [{"name": "mine", "kind": "mine"}], "repeat": {"seed": [0, 1]}}
     with monkeypatch.context() as patch:
-        patch.setitem(METHODS, "mine", type("Mine", (METHODS["path-drawn"],), {"__module__": "mine"}))
+        patch.setitem(METHODS, "mine", type("Mine", (METHODS["kernel"],), {"__module__": "mine"}))
         plan = tiny_plan(tmp_path, changes)
         make_run(folder, plan)
         for name, part in plan.parts.items():

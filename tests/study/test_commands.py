@@ -14,7 +14,7 @@ from shipid.data.dataset import Dataset, sample_columns, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError
-from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.kernel_compensator import KernelCompensator
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error, summarise_errors
 from shipid.predictor import Predictor
@@ -100,8 +100,8 @@ def test_a_stored_predictor_takes_the_plan(tmp_path: Path, recorded: Callable[..
         with pytest.raises(DataError, match="made for known commands"):
             predictor.predict(test.instants())
     pure = Predictor.load(store.cell_file(tmp_path / "run", str(rows[rows["foundation"] == "none"]["cell"].iloc[0])))
-    assert isinstance(pure.corrector, Compensator)
-    assert any(".planned-" in name for network in pure.corrector.networks for name in network.features)
+    assert isinstance(pure.corrector, KernelCompensator)
+    assert any(".planned-" in name for name in pure.corrector.normaliser.names)
 
 
 def test_a_log_holds_the_plan(tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
@@ -109,7 +109,7 @@ def test_a_log_holds_the_plan(tmp_path: Path, recorded: Callable[..., tuple[Plan
     plan, dataset = recorded(weaving(), split={"test": 2}, prediction={"ahead": 5.0, "commands": "known"})
     run_here(plan, tmp_path / "run")
     log = write_dataset(dataset, tmp_path / "log.parquet")
-    cell = plan.batches[0].cell("right", "drawn")
+    cell = plan.batches[0].cell("right", "kernel")
     frame, _ = predict_log(tmp_path / "run", cell, log, None, tmp_path / "paths.csv")
     assert frame.groupby("run")["t"].max().eq(36.0).all()  # orders are needed until the start of the last step
     run = frame[(frame["run"] == "a") & (frame["ahead"] == 4.0) & (frame["t"] == 10.0)].iloc[0]

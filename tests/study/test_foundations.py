@@ -32,7 +32,7 @@ WRONG: dict[str, Any] = {"name": "wrong", "base": "gunnerus-28.9", "perturb": [{
 IDENTIFY = {"parameters": PATHS, "weights": WEIGHTS, "method": "euler"}
 FITTED: dict[str, Any] = {"name": "fitted", "extends": "wrong", "identify": IDENTIFY}
 BOTH = [WRONG, FITTED]
-METHODS = [{"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "terms": 4}]
+METHODS = [{"name": "kernel", "kind": "kernel", "trials": 2, "steps": 2, "terms": 4}]
 METHODS.append({"name": "alone", "kind": "alone"})
 
 Recorded = Callable[..., tuple[Plan, Dataset]]
@@ -200,10 +200,10 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
     rows = results.cells.set_index(["foundation", "method"])
-    assert set(rows.index) == {*((f, m) for f in ("wrong", "fitted") for m in ("drawn", "alone")), ("none", "drawn")}
+    assert set(rows.index) == {*((f, m) for f in ("wrong", "fitted") for m in ("kernel", "alone")), ("none", "kernel")}
     for name in ("wrong", "fitted"):
-        assert rows.loc[(name, "alone"), "H"] == rows.loc[(name, "alone"), "A"] == rows.loc[(name, "drawn"), "A"]
-    assert rows.loc[("fitted", "drawn"), "A"] < 0.1 * rows.loc[("wrong", "drawn"), "A"]
+        assert rows.loc[(name, "alone"), "H"] == rows.loc[(name, "alone"), "A"] == rows.loc[(name, "kernel"), "A"]
+    assert rows.loc[("fitted", "kernel"), "A"] < 0.1 * rows.loc[("wrong", "kernel"), "A"]
     assert (rows["status"] == "ok").all()
     dataset, test = results.dataset, results.test
     for row in rows.itertuples():

@@ -86,7 +86,7 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     assert "| equal " in summary
     for row in (one for one in read_results(folder).rows if one["foundation"] == "weighed"):
         equal = np.ptp(Predictor.load(cell_file(folder, row["cell"])).corrector.weights) == 0  # type: ignore[attr-defined]
-        assert (EQUAL_WEIGHTS in row["sentence"]) == (row["method"] != "drawn") == equal
+        assert (EQUAL_WEIGHTS in row["sentence"]) == (row["method"] != "kernel") == equal
     assert f"ok: {EQUAL_WEIGHTS}" in summary
     assert EQUAL_WEIGHTS not in answer
     results = read_results(folder)
@@ -97,7 +97,7 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     assert results.complete
     assert not {"equal", "weighed"} & {*_errors_by_step(results, 6)}
     cells = method_cells(results)
-    tables = [method_table(one, "drawn") for one in (cells, cells[~cells["family"].isin(["equal", "weighed"])])]
+    tables = [method_table(one, "kernel") for one in (cells, cells[~cells["family"].isin(["equal", "weighed"])])]
     assert_frame_equal(*(one[one["family"] == WITH_PHYSICS].reset_index(drop=True) for one in tables))
 
 

@@ -54,10 +54,10 @@ commands = "known"
 [grid]
 N_D = [6]
 [[method]]
-name = "drawn"
-kind = "path-drawn"
+name = "kernel"
+kind = "kernel"
 trials = 2
-units = 16
+steps = 2
 terms = 3
 [[method]]
 name = "alone"
@@ -109,8 +109,8 @@ def test_the_correction_takes_the_pitch_as_an_input(finished: tuple[Plan, Result
     """Other pitches, other paths, beyond what the physics makes of them; half the error of weak thrust is gone."""
     _, results = finished
     rows = store.read_rows(results.folder).set_index(["foundation", "method"])
-    assert rows.loc[("weak", "drawn"), "H"] < 0.7 * rows.loc[("weak", "alone"), "H"]
-    cell = rows.loc[("none", "drawn"), "cell"]
+    assert rows.loc[("weak", "kernel"), "H"] < 0.7 * rows.loc[("weak", "alone"), "H"]
+    cell = rows.loc[("none", "kernel"), "cell"]
     predictor = Predictor.load(store.cell_file(results.folder, cell))
     instants = results.test.instants(known=True)
     other = dict(instants.columns) | {"cpp.pitch": instants.columns["cpp.pitch"] + 0.2}

@@ -15,8 +15,8 @@ from shipid import capacity
 from shipid import document as documents
 from shipid.document import bundled_documents
 from shipid.errors import DocumentError
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.methods import METHODS
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import (
@@ -112,13 +112,9 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     """19 models and the nominal one, N_D = 10, 20, ... 100, 50 trials per cell; the small one is a part of it."""
     full, small = read_plan("simulation"), read_plan("simulation-small")
     assert [batch.N_D for batch in full.batches] == list(range(100, 0, -10))
-    assert [way.method for way in full.methods] == [PathTrained(), PathDrawn(mirror=0.0)]
-    assert full.methods[0].method.trials == small.methods[0].method.trials == 50  # type: ignore[attr-defined]
-    assert (
-        read_plan("simulation", {"method.0.kind": "path-drawn"}).methods[0].method
-        == small.methods[0].method
-        == PathDrawn()
-    )
+    assert [way.method for way in full.methods] == [PathTrained(), Kernel(mirror=False)]
+    assert full.methods[0].method.trials == 50  # type: ignore[attr-defined]
+    assert read_plan("simulation", {"method.0.kind": "kernel"}).methods[0].method == small.methods[0].method == Kernel()
     assert small.study.truth == full.study.truth
     assert small.study.split == full.study.split
     assert small.study.prediction == full.study.prediction
@@ -143,7 +139,7 @@ def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path:
             assert all(one.variant.values[path] != other.variant.values[path] for path in one.variant.values)
     assert there.digest != here.digest
     assert digest_without_seed(there) == digest_without_seed(here)
-    other = tiny_plan(tmp_path, {**changes, "method.0.units": 7})
+    other = tiny_plan(tmp_path, {**changes, "method.0.steps": 7})
     assert digest_without_seed(other) != digest_without_seed(here)
 
 
@@ -210,13 +206,13 @@ def test_changes_that_reach_nothing_are_reported(tmp_path: Path, changes: dict[s
 
 
 def test_the_command_of_a_users_method_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Mine(PathDrawn):
+    class Mine(Kernel):
         """Of a user: no class of shipid."""
 
     monkeypatch.setattr("shipid.study.plan.TRIED_FILES", [Path("my files/own.py")])
     assert run_command(tiny_plan(tmp_path)).startswith("shipid study run ")
     monkeypatch.setitem(METHODS, "mine", Mine)
-    plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine", "trials": 1, "units": 8, "terms": 4}]})
+    plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine", "trials": 1, "terms": 4}]})
     assert run_command(plan).startswith(f"shipid --with 'my files/own.py' study run {tmp_path}/tiny.toml --set ")
 
 
@@ -237,12 +233,15 @@ def test_digest_follows_the_vessel_of_the_truth(tmp_path: Path) -> None:
 
 
 def test_work_is_cut_where_cells_share_hardly_anything(tmp_path: Path) -> None:
-    """Networks that are trained by themselves are a unit each; the whole closed form at one amount of data is one."""
+    """Cells that are fitted by themselves are a unit each; networks that train as one stack are one together."""
     plan = read_plan("simulation")
     sizes = [len(unit.pairs) for unit in plan.units]
     assert (len(plan.units), max(sizes), sum(sizes)) == (210, 1, plan.cells)
     assert len({unit.key for unit in plan.units}) == 210
-    assert [unit.key for unit in tiny_plan(tmp_path).units] == ["N0006-s0", "N0004-s0"]
+    tiny = tiny_plan(tmp_path)
+    assert [unit.key for unit in tiny.units] == [
+        f"{name}+kernel-N000{N_D}-s0" for N_D in (6, 4) for name in ("right", "wrong-1", "wrong-2", "none")
+    ]
     stacked = read_plan("simulation", {"method.0.layers": 2, "method.0.units": 32})  # one architecture trains as one
     assert [len(unit.pairs) for unit in stacked.units] == [20, 1] * 10
 
@@ -252,7 +251,7 @@ def test_an_identification_is_in_one_unit(tmp_path: Path) -> None:
     plan = mixed_plan(tmp_path)
     for unit in plan.units:
         fitted = {method for foundation, method in unit.pairs if foundation == "fitted"}
-        assert fitted in (set(), {"drawn", "trained", "alone"})
+        assert fitted in (set(), {"kernel", "trained", "alone"})
     every = [pair for unit in plan.units for pair in unit.pairs]
     assert sorted(every) == sorted((name, way.name) for name, way in plan.pairs)
     assert len({unit.key for unit in plan.units}) == len(plan.units) > 5
@@ -278,12 +277,12 @@ def test_every_file_of_a_log_is_part_of_the_study(tmp_path: Path) -> None:
 
 
 def test_the_judged_method_is_the_first_that_learns_beside_physics(tmp_path: Path) -> None:
-    drawn = {"kind": "path-drawn", "trials": 1, "units": 8, "terms": 4}
+    drawn = {"kind": "kernel", "trials": 2, "steps": 2, "terms": 4}
     alone = {"name": "plain", "families": ["none"], **drawn}
     still = {"name": "still", "kind": "alone"}
-    both = tiny_plan(tmp_path, {"method": [alone, {"name": "drawn", **drawn}]})
+    both = tiny_plan(tmp_path, {"method": [alone, {"name": "kernel", **drawn}]})
     plans = both, tiny_plan(tmp_path, {"method": [alone, still]})
-    assert [verdict_method(plan) for plan in plans] == ["drawn", "plain"]
+    assert [verdict_method(plan) for plan in plans] == ["kernel", "plain"]
 
 
 def test_a_digest_says_what_is_in_every_file_that_a_study_reads(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, Prepa
 
 def test_the_order_of_columns_changes_no_digit(tmp_path: Path) -> None:
     """Columns the other way round changed H of drawn networks by up to a half, as another seed would."""
-    drawn = {"name": "drawn", "kind": "path-drawn", "trials": 2, "units": 16, "terms": 4}
+    drawn = {"name": "kernel", "kind": "kernel", "trials": 2, "steps": 2, "terms": 4}
     stepped = {"name": "stepped", "kind": "one-step", "trials": 1, "units": 8, "families": ["right", "none"]}
     plan = tiny_plan(tmp_path, {"method": [drawn, stepped], "grid.N_D": [4]})
     dataset = obtain_runs(plan)

@@ -12,7 +12,7 @@ from shipid.study.check import search_words
 from shipid.study.store import JOURNALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
-ONE, OTHER = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
+ONE, OTHER = "right+kernel-N0004-s0", "wrong-1+kernel-N0004-s0"
 
 
 def row(number: int, value: float) -> dict[str, Any]:

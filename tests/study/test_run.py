@@ -23,9 +23,9 @@ from shipid.engine import native
 from shipid.errors import ResultError, ShipidError
 from shipid.files import read_json
 from shipid.hybrid.alone import UnchangedPath
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error, summarise_errors
 from shipid.physics import TERMS
@@ -58,7 +58,7 @@ def numbers(folder: Path) -> list[dict[str, Any]]:
 
 
 def test_interrupted_on_workers_and_resumed_here_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
-    """Two processes, stopped after the first batch; the other batch is done in this process."""
+    """Two processes, stopped after the first cell; the others are done in this process."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     events = run_study(plan, folder, workers=2)
     kinds = []
@@ -74,7 +74,7 @@ def test_interrupted_on_workers_and_resumed_here_gives_the_same_numbers(tmp_path
     partial = read_results(folder)
     assert not partial.complete
     resumed = run_here(store.stored_plan(folder), folder)
-    assert [event.done for event in resumed if event.kind in ("start", "cell", "end")] == [4, 5, 6, 7, 8, 8]
+    assert [event.done for event in resumed if event.kind in ("start", "cell", "end")] == [*range(1, 9), 8]
     assert stored[0].read_bytes() == before
     assert numbers(folder) == numbers(tiny_run)
     assert read_results(folder).complete
@@ -140,13 +140,13 @@ def test_an_engine_that_is_given_up_is_noted_before_anything_of_another_is_store
 def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The finished cells are those of the method as it was; nothing said so."""
     file = tmp_path / "mine.py"
-    file.write_text("from shipid.hybrid.path_drawn import PathDrawn\n\n\nclass Mine(PathDrawn):\n    pass\n")
+    file.write_text("from shipid.hybrid.kernel import Kernel\n\n\nclass Mine(Kernel):\n    pass\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     module, folder = importlib.import_module("mine"), tmp_path / "run"
 
     def planned() -> Plan:
         monkeypatch.setitem(METHODS, "mine", module.Mine)
-        method = {"name": "own", "kind": "mine", "trials": 1, "units": 8, "terms": 4}
+        method = {"name": "own", "kind": "mine", "trials": 1, "terms": 4}
         return tiny_plan(tmp_path, {"method": [method], "grid.N_D": [4]})
 
     plan = planned()
@@ -230,12 +230,12 @@ def _batch(tmp_path: Path, N_D: Any) -> Any:
 
 def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model without a compensator: its row says so, the others keep their results, the report's frames stand."""
-    fit = PathDrawn.fit
+    fit = Kernel.fit
 
-    def failing(method: PathDrawn, task: Task) -> dict[str, FitResult]:
+    def failing(method: Kernel, task: Task) -> dict[str, FitResult]:
         return fit(method, task) | {"wrong-1": FitResult(None, [], 0.0)}
 
-    monkeypatch.setattr(PathDrawn, "fit", failing)
+    monkeypatch.setattr(Kernel, "fit", failing)
     run_here(tiny_plan(tmp_path), tmp_path / "run")
     rows = store.read_rows(tmp_path / "run").set_index("foundation")
     assert set(rows.loc["wrong-1", "status"]) == {"failed"}
@@ -416,7 +416,7 @@ def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(tmp_path: Path, monke
     monkeypatch.setitem(METHODS, "faulty", Faulty)
     monkeypatch.setattr(sys.modules[__name__], "MISTAKE", "raises")
     methods = [
-        {"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "terms": 4},
+        {"name": "kernel", "kind": "kernel", "trials": 2, "steps": 2, "terms": 4},
         {"name": "mine", "kind": "faulty"},
     ]
     plan = tiny_plan(tmp_path, {"method": methods, "claims": {"method": "mine"}, "grid.N_D": [4]})
@@ -426,7 +426,7 @@ def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(tmp_path: Path, monke
     message = rf"Moved\.predict: ValueError: first second in {re.escape(__file__)}, line \d+"
     assert re.fullmatch(message, str(caught.value))
     finished = {file: file.read_bytes() for file in (folder / "cells").iterdir()}
-    assert len(finished) == len(plan.foundations)  # those of `drawn`
+    assert len(finished) == 1  # the cell before it
     monkeypatch.setattr(sys.modules[__name__], "MISTAKE", "")
     run_here(plan, folder)
     assert {file: file.read_bytes() for file in finished} == finished
@@ -437,7 +437,7 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its class travels by value: what a worker was started by has nothing to do with it."""
-    kind = type("Mine", (METHODS["path-drawn"],), {"__module__": "__main__"})
+    kind = type("Mine", (METHODS["kernel"],), {"__module__": "__main__"})
     monkeypatch.setitem(METHODS, "mine", kind)
     monkeypatch.setattr(run, "run_unit", lambda *_: [])
     monkeypatch.setattr(run, "journal_by_topic", lambda *_: None)

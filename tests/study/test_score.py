@@ -140,7 +140,7 @@ def test_a_file_that_is_no_table_is_told_in_one_line(
 
 def test_a_name_of_the_study_is_marked(tmp_path: Path, results: Results) -> None:
     path = next(iter(results.paths.values()))
-    for name, label in (("path-drawn", "path-drawn (given)"), ("wrong-1", "wrong-1 (given)"), ("own", "own")):
+    for name, label in (("kernel", "kernel (given)"), ("wrong-1", "wrong-1 (given)"), ("own", "own")):
         file = written(tmp_path / "p.parquet", results, path, model=name)
         assert [one.label for one in read_predictions(file, results)] == [label]
 
@@ -148,12 +148,12 @@ def test_a_name_of_the_study_is_marked(tmp_path: Path, results: Results) -> None
 def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blind(
     tmp_path: Path, results: Results
 ) -> None:
-    cell = next(row for row in results.rows if row["method"] == "path-drawn" and row["family"] == "wrong")
+    cell = next(row for row in results.rows if row["method"] == "kernel" and row["family"] == "wrong")
     file = written(tmp_path / "rival.parquet", results, results.paths[cell["cell"]])
     table = shipid.score(results.folder, file)["rival"]
-    same = table[table["method"].eq("path-drawn") & table["family"].eq("none")].iloc[0]
+    same = table[table["method"].eq("kernel") & table["family"].eq("none")].iloc[0]
     ratios = [np.log(results.errors[row["cell"]]) - np.log(results.errors[cell["cell"]]) for row in results.rows
-              if row["method"] == "path-drawn" and row["family"] == "none" and row["N_D"] == same["N_D"]]  # fmt: skip
+              if row["method"] == "kernel" and row["family"] == "none" and row["N_D"] == same["N_D"]]  # fmt: skip
     assert same["difference"] == pytest.approx(100 * np.expm1(np.mean(ratios)))
     assert (shipid.compare_methods(results)["method"] == "rival").sum() == 3
     with without_figures():

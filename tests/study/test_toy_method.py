@@ -36,7 +36,7 @@ def test_a_new_method_goes_through_a_whole_study(
     tmp_path: Path, toy: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(METHODS, "linear", toy.Linear)
-    drawn = {"name": "drawn", "kind": "path-drawn", "trials": 1, "terms": 4, "units": 8}
+    drawn = {"name": "kernel", "kind": "kernel", "trials": 2, "steps": 2, "terms": 4}
     added = {"name": "toy", "kind": "linear", "families": ["right", "none"], "ridge": 1e-12}
     bare = {"name": "bare", "kind": "alone", "families": ["*"]}
     changes = {"method": [drawn, added, bare], "claims": {"method": "toy"}, "grid.N_D": [4]}
@@ -59,7 +59,7 @@ def test_a_new_method_goes_through_a_whole_study(
     assert frame["cooperative_north"].notna().all()
     content = report_content(read_results(folder))
     assert "right+toy-N0004-s0" in set(content.trials["cell"])
-    assert {"right", "right + drawn"} <= set(content.cells["model"])
+    assert {"right", "right + kernel"} <= set(content.cells["model"])
     # without a ridge what is left over the windows that train is orthogonal to every input: least squares
     prepared = prepare(plan, read_dataset(folder / store.DATASET))
     batch = plan.batches[0]
@@ -87,7 +87,7 @@ class Otherwise(Method):
 def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They were taken for the trials, the mirror, the memory and the polynomial that a study speaks of."""
     monkeypatch.setitem(METHODS, "otherwise", Otherwise)
-    drawn = {"name": "drawn", "kind": "path-drawn", "trials": 1, "terms": 4, "units": 8}
+    drawn = {"name": "kernel", "kind": "kernel", "trials": 2, "steps": 2, "terms": 4}
     added = {"name": "mine", "kind": "otherwise", "families": ["none"]}
     plan = tiny_plan(tmp_path, {"method": [drawn, added], "grid.N_D": [4]})
     mine = plan.methods[1]
@@ -95,5 +95,5 @@ def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monk
     assert plain_rival(plan) is None
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
-    assert provenance_words(results)["methods"] == "drawn (path-drawn): 1 trials; mine (otherwise)"
+    assert provenance_words(results)["methods"] == "kernel: 2 trials; mine (otherwise)"
     assert report_content(results).answer

@@ -35,11 +35,9 @@ from tests.study.tiny import run_here, tiny_plan
 Array = np.ndarray
 EVERYTHING = {"history": [2.0, 4.0], "turned": [6.0], "error": [3.0, 6.0], "observer": True}
 SMALL: Mapping[str, Mapping[str, Any]] = {  # settings that make a method cheap; one without an entry takes its defaults
-    "path-drawn": {"trials": 2, "units": 8, "terms": 3},
-    "path-refined": {"trials": 2, "units": 8, "terms": 3, "epochs": 1},
     "path-trained": {"trials": 1, "layers": 1, "units": 8, "epochs": 3},
     "learned-force": {"trials": 1, "ridge": 0.1, "units": 2, "iterations": 3},
-    "calibrator": {"trials": 2, "units": 8, "terms": 3},
+    "calibrator": {"trials": 1, "terms": 3},
     "forest": {"trials": 1, "trees": 3},
     "hankel-dmd": {"delays": [2.0]},
     "modules": {"trials": 1, "units": 2},

@@ -1,4 +1,4 @@
-"""The smallest study there is: 12 short manoeuvres, 3 models, networks that hardly train."""
+"""The smallest study there is: 12 short manoeuvres, 3 models, descents of two steps."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def physics_errors(prepared: PreparedStudy, foundation: str) -> ErrorSummary:
 
 
 MIXED = [
-    {"name": "drawn", "kind": "path-drawn", "trials": 1, "units": 8, "terms": 4},
+    {"name": "kernel", "kind": "kernel", "trials": 2, "steps": 2, "terms": 4},
     {"name": "trained", "kind": "path-trained", "trials": 2, "epochs": 3, "units": [4, 5], "layers": [1, 2]},
     {
         "name": "stacked",
