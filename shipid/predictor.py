@@ -495,7 +495,7 @@ def fit(
     seed : of all that is random.
     refits : of methods that have no errors on runs left out for nothing, fit so many times more, each without a share
         of the runs, to calibrate a band; 0 makes such predictors without a band. Only `alone`, and
-        `kernel` where several runs validate in turn, have such errors.
+        `kernel` and `calibrator` where several runs validate in turn, have such errors.
     kinds : kind of manoeuvre by run, for bands that hold their share for runs of a kind.
 
     Raises

@@ -315,7 +315,7 @@ def study_compare(
         check_output(out, endings=TABLES)
     matched = [one.partition("=") for one in pair or ()]
     if wrong := next(("".join(one) for one in matched if not all(one)), None):
-        raise DocumentError(f"{wrong!r}: write --pair FIRST=OTHER, such as --pair drawn=trained", path="--pair")
+        raise DocumentError(f"{wrong!r}: write --pair FIRST=OTHER, such as --pair instant=trained", path="--pair")
     with open_answer(as_json) as answer:
         if pair is None and compare.are_worlds(folders):
             errors = _show_worlds(compare.read_worlds(folders), answer)

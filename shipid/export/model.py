@@ -212,7 +212,7 @@ class ExportModel:
         if count > MOST_NUMBERS:
             raise ShipidError(
                 f"the tables of {self.predictor.method} hold {count} numbers, an export at most {MOST_NUMBERS}: "
-                "use fewer trees or units, larger leaves, or the method kernel with fewer centres"
+                "use fewer trees, units or centres, or larger leaves"
             )
         inputs, layout, method = symbols_of(self.layout.sizes), self.layout, self.predictor.method
         now, instants = split_by_name(layout.now, inputs["now"]), symbolic_instants(layout, inputs)

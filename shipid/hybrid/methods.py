@@ -37,6 +37,7 @@ METHODS |= {
 }
 
 RETIRED = ("path-drawn", "path-refined")
+"""Kinds of version 0.2.0 in whose place there is `kernel`."""
 
 
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:

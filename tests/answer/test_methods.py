@@ -19,7 +19,7 @@ from shipid.report.wording import difference_text
 def cells(
     rng: np.random.Generator, effect: float, worlds: int = 2, runs: int = 12, noise: float = 0.3, trained: bool = False
 ) -> pd.DataFrame:
-    """Cells of `drawn` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much.
+    """Cells of `kernel` and of `other`, which errs by `effect` [m] more, in runs and worlds that differ much.
 
     The runs of one world are longer than those of another, as the parts of a study with each run as the test in turn.
     """

@@ -104,6 +104,12 @@ def test_a_descent_ends_below_its_start_and_is_made_again_to_the_digit() -> None
     assert longer["epochs"] > first["epochs"]
 
 
+def test_where_the_physics_misses_nothing_nothing_is_added() -> None:
+    """The logarithm of an error of 0 was a warning."""
+    fit = tuned(drawn_columns(), np.zeros((STEPS, 120, 2)))
+    np.testing.assert_array_equal(compensation(fit.corrector, drawn_columns(seed=5, count=9)), 0.0)
+
+
 def test_only_scales_of_inputs_that_there_are_are_searched() -> None:
     columns = {name: values for name, values in drawn_columns().items() if name not in ("V_w", "beta_w")}
     fit = tuned(columns, missed_paths(columns))

@@ -41,7 +41,7 @@ def test_a_new_method_goes_through_a_whole_study(
     bare = {"name": "bare", "kind": "alone", "families": ["*"]}
     changes = {"method": [drawn, added, bare], "claims": {"method": "toy"}, "grid.N_D": [4]}
     plan = tiny_plan(tmp_path, changes)
-    # four foundations with `drawn`, two with `toy`, three with `bare`: `alone` does not meet `none`
+    # four foundations with `kernel`, two with `toy`, three with `bare`: `alone` does not meet `none`
     assert plan.cells == 4 + 2 + 3
     assert verdict_method(plan) == "toy"
     assert model_label(plan, "right", "toy") == "right"
