@@ -26,7 +26,6 @@ def log_of(ship: Vessel, n_rpm: float) -> Dataset:
     runs = [
         Excitation(
             name=name,
-            signal="aprbs",
             angle_deg=10.0,
             n_rpm=n_rpm,
             amplitude_rpm=0.2 * n_rpm,

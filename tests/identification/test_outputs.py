@@ -57,7 +57,6 @@ def trials(seed: int = 1, steady: bool = False) -> Dataset:
     kinds = [
         Excitation(
             name=f"S{n}",
-            signal="aprbs",
             n_rpm=n,
             amplitude_rpm=0.0 if steady else 0.2 * n,
             angle_deg=0.0 if steady else 15.0,
@@ -81,7 +80,7 @@ def ship_outputs() -> tuple[str, ...]:
 def test_outputs_are_compared_in_the_current_of_all_runs(current: tuple[float, float]) -> None:
     """A ship of the same numbers repeats its thrust exactly, once its speed through the water is known."""
     ship = tanker().with_values({"current.kind": "uniform"})
-    kinds = [Excitation(name="S", signal="aprbs", n_rpm=400.0, angle_deg=15.0, duration=60.0, hold=(10.0, 20.0))]
+    kinds = [Excitation(name="S", n_rpm=400.0, angle_deg=15.0, duration=60.0, hold=(10.0, 20.0))]
     flow = {"V_c": np.array([np.hypot(*current)]), "beta_c": np.array([np.arctan2(*current[::-1])])}
     frame = perform_manoeuvres(ship, kinds, step=1.0, outputs=list(ship_outputs()), environment=flow)
     kept = [name for name in frame if not str(name).startswith("actual.") and name not in flow]
