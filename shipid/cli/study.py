@@ -108,7 +108,7 @@ def study_screen(
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
-    """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    """Show how accurate many members of a study's families are on all its windows."""
     from shipid.engine.engines import REPEATED, check_device
     from shipid.study import screen
     from shipid.study.plan import input_files
@@ -128,14 +128,9 @@ def study_screen(
             blocks.append(block)
             say(f"{sum(map(len, blocks))} of {members * len(wanted)} members")
     frame = screen.join_blocks(blocks)
-    correlations = screen.drivers_of_accuracy(frame)
     with open_answer(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
         answer.records("accuracy", screen.accuracy_quantiles(frame))
-        if len(correlations):
-            answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
-        signs = dict.fromkeys(("factor", "away"), "{:+.2f}".format)
-        answer.records("drivers", correlations, formats=signs)
         answer.save(f"{len(frame)} members", file, frame)
 
 
