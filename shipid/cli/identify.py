@@ -249,8 +249,6 @@ def _show_identified(outcome: Identification, answer: Answer) -> None:
     heads = {"set": "runs", "model": "model"} | MOTION
     errors = outcome.errors[outcome.errors["run"] == ALL]
     answer.records("free_runs", outcome.errors, heads, {"set": sets.__getitem__, **MOTION_FORMATS}, shown=errors)
-    heads = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before", "after": "after"}
-    answer.records("outputs", outcome.outputs, heads)
     _show_manoeuvres(outcome, answer)
     worth = outcome.solution.effective
     if worth:
