@@ -125,15 +125,12 @@ def share_interval(held: NDArray[Any], run: NDArray[Any]) -> tuple[float, float]
     return low, high
 
 
-def world_interval(values: Array, least: float = -np.inf, greatest: float = np.inf) -> tuple[float, float]:
-    """Student's 95 % interval of a mean over worlds, which are independent; NaN from fewer than `FEWEST_WORLDS`.
-
-    least, greatest : what such a number can be; what lies beyond is cut off, which costs no coverage.
-    """
+def world_interval(values: Array) -> tuple[float, float]:
+    """Student's 95 % interval of a mean over worlds, which are independent; NaN from fewer than `FEWEST_WORLDS`."""
     if len(values) < FEWEST_WORLDS:
         return np.nan, np.nan
     wide = float(stdtrit(len(values) - 1, 1 - SIGNIFICANT) * values.std(ddof=1) / len(values) ** 0.5)
-    return max(float(values.mean()) - wide, least), min(float(values.mean()) + wide, greatest)
+    return float(values.mean()) - wide, float(values.mean()) + wide
 
 
 def doubling_weights(x: Array) -> Array:

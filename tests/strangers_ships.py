@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -404,7 +404,7 @@ def _manoeuvre(random: Random, run: Run, name: str, n: float, pace: float, drawn
         return CrashStop(astern_rpm=0.6 * rpm, duration=length, **how)
     seed = int(random.integers(1_000_000))
     if run.kind == "straight":
-        return Excitation(signal="multisine", angle_deg=2.0, period=length, seed=seed, duration=0.7 * length, **how)
+        return Excitation(angle_deg=2.0, seed=seed, duration=0.7 * length, **how)
     steps = drawn["drive"] != "screw" and random.random() < 0.5
     if steps:
         orders: dict[str, tuple[float, float]] = {"n_rpm": (0.4 * rpm, rpm)}
@@ -416,10 +416,9 @@ def _manoeuvre(random: Random, run: Run, name: str, n: float, pace: float, drawn
         held = (1.5 * slow, 6 * slow)
         return StepManoeuvre(name=name, course_deg=how["course_deg"], orders=orders, hold=held, seed=seed,
                      start_speed=start, duration=1.5 * length)  # fmt: skip
-    signal: Literal["aprbs", "multisine"] = "aprbs" if random.random() < 0.5 else "multisine"
     return Excitation(
-        signal=signal, angle_deg=run.angle, amplitude_rpm=rpm * float(random.choice([0.0, 0.2])), seed=seed,
-        period=1.5 * length, harmonics=(1, 15), hold=(1.5 * slow, 5 * slow), duration=1.5 * length, **how,
+        angle_deg=run.angle, amplitude_rpm=rpm * float(random.choice([0.0, 0.2])), seed=seed,
+        hold=(1.5 * slow, 5 * slow), duration=1.5 * length, **how,
     )  # fmt: skip
 
 

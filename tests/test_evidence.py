@@ -191,7 +191,6 @@ def test_worlds() -> None:
         assert np.isnan(world_interval(np.arange(1.0, 1.0 + few))).all()
     wide = 4.3027 / 3**0.5
     assert world_interval(np.array([1.0, 2.0, 3.0])) == pytest.approx((2 - wide, 2 + wide), abs=1e-3)
-    assert world_interval(np.array([1.0, 2.0, 3.0]), 0.0, 3.5) == (0.0, 3.5)
 
 
 def test_all_need_no_correction_and_some_do() -> None:

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset, read_dataset
+from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError, ShipidError
@@ -34,6 +34,7 @@ from shipid.predictor import fit
 from shipid.report.wording import number_text
 from shipid.simulation import manoeuvre
 from shipid.simulation.approach import Controls
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.standard import define_standard
 from shipid.simulation.truth import Truth, simulate_truth
 from shipid.study.envelope import envelope_table
@@ -230,14 +231,6 @@ def coast_down(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(manoeuvre.KINDS, "coast_down", made.CoastDown)
 
 
-def as_document(folder: Path, **keys: Any) -> Path:
-    """A document of one manoeuvre."""
-    block = {"kind": "coast_down", "n_rpm": 600, "execute_at": 5, "duration": 40, **keys}
-    file = folder / "runs.toml"
-    file.write_text("step = 0.1\ninterval = 0.5\n[[manoeuvre]]\n" + "".join(f"{k} = {v!r}\n" for k, v in block.items()))
-    return file
-
-
 def command(*words: object) -> Any:
     """What a command writes with `--json`."""
     result = CliRunner().invoke(app, [*map(str, words), "--json"])
@@ -256,11 +249,13 @@ def coasting_study(folder: Path, kind: str = "coast_down") -> Plan:
 
 
 @pytest.mark.usefixtures("coast_down")
-def test_a_document_the_measures_of_a_log_and_the_command_take_the_manoeuvre(tmp_path: Path) -> None:
-    """From a document to a log, from the log to its measures; and by the command at the scale of the ship."""
+def test_the_measures_of_a_log_and_the_command_take_the_manoeuvre(tmp_path: Path) -> None:
+    """From a log to its measures; and by the command at the scale of the ship."""
     log, page = tmp_path / "log.parquet", tmp_path / "page.html"
-    command("simulate", "kvlcc2-l7", "--manoeuvres", as_document(tmp_path, execute_at=15, duration=300), "--out", log)
-    frame = read_dataset(log).frame
+    run = manoeuvre.KINDS["coast_down"].model_validate({"n_rpm": 600, "execute_at": 15, "duration": 300})
+    frame = perform_manoeuvres(load_vessel("kvlcc2-l7"), run, step=0.1, interval=0.5)
+    frame = frame[[name for name in frame if not name.startswith("actual.")]]
+    write_dataset(Dataset(frame, {"clock": "run", "flags": []}), log)
     assert set(frame["propeller.n"].round(9)) == {10.0, 0.0}
     rows = {row["measure"]: row for row in command("data", "measures", log, "--manoeuvre", "coast-down")["measures"]}
     assert rows["execute"]["value"] == 15

@@ -1,17 +1,15 @@
-"""Finished runs compared: what their documents differ in, errors cell by cell, and one study in several worlds.
+"""Finished runs compared: what their documents differ in, and errors cell by cell.
 
 Cells are set against those of the first run with the same family, member, method, N_D and seed, on the test windows
-that both predict. Runs of one study that differ in their top-level seed alone are repetitions of it.
+that both predict.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,33 +17,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid import document as documents
-from shipid.answer.findings import judge_findings
 from shipid.answer.verdict import too_few_manoeuvres
 from shipid.arguments import as_path
 from shipid.document import Document
 from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
-from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
-from shipid.files import quote_argument
+from shipid.evidence import CellErrors, compare_cells, which_significant
 from shipid.metrics import error_of_windows, position_error, summarise_errors
 from shipid.notebooks import NotebookView
 from shipid.report.wording import counted_text
 from shipid.study.declared import NO_METHOD, NO_MODEL
-from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
+from shipid.study.plan import Plan, drawn_conditions, fitted_families, learns_from_runs
 from shipid.study.results import Results, read_results
 from shipid.study.schema import WORLDS, Study
-from shipid.study.store import stored_plan
 
 IDENTICAL = "identical"
 """Verdict on cells that err alike to the digit."""
 MATCHED_KEYS = ["family", "member", "method", "N_D", "seed"]
 MOTION_COLUMNS = ("psi", "u", "v", "r")  # what says whether two windows are the same moment of the same recording
 ABSENT = "-"  # shown where a document has no such key
-POSSIBLE = {
-    "rank correlation": (-1.0, 1.0),
-    "share": (0.0, 1.0),
-    **dict.fromkeys(("H ", "gap", "ratio", "roughness", "variation", "verdicts"), (0.0, np.inf)),
-}
-"""What a key number of a finding can be, by a word in its name; others can be any."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -273,57 +262,3 @@ def _differing_values(values: Sequence[Any], path: str) -> Iterator[tuple[str, S
             yield from _differing_values([value.get(key) for value in values], f"{path}.{key}".removeprefix("."))
     elif any(value != values[0] for value in values):
         yield path, values
-
-
-def are_worlds(folders: Sequence[Path]) -> bool:
-    """Whether folders hold one study in different worlds, so that they are repetitions of one another."""
-    plans = [stored_plan(folder) for folder in folders]
-    same = len({digest_without_seed(plan) for plan in plans}) == 1
-    return same and len(plans) > 1 and len({plan.study.seed for plan in plans}) == len(plans)
-
-
-def read_worlds(folders: Sequence[Path]) -> list[Results]:
-    """Read finished runs of one study in different worlds, see `are_worlds`; ResultError for one not finished."""
-    worlds = [read_results(folder) for folder in folders]
-    if unfinished := [results.folder for results in worlds if not results.complete]:
-        message = f"is not finished: continue with `shipid study resume {quote_argument(unfinished[0])}`"
-        raise ResultError(message, file=unfinished[0])
-    return worlds
-
-
-def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
-    """One row per finding and key number: id, claim, verdicts, number, mean over the worlds that have it, low, high.
-
-    low and high are Student's 95 % interval over worlds, within what the number can be.
-    """
-    rows = []
-    for same in zip(*(judge_findings(results) for results in worlds), strict=True):
-        verdicts = ", ".join(f"{count} {word}" for word, count in Counter(one["verdict"] for one in same).most_common())
-        for name in dict.fromkeys(name for one in same for name in one["numbers"]) or [""]:
-            values = np.array([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)
-            within = next((limits for word, limits in POSSIBLE.items() if word in name), (-np.inf, np.inf))
-            mean = values.mean() if len(values) else np.nan
-            rows.append((same[0]["id"], same[0]["claim"], verdicts, name, mean, *world_interval(values, *within)))
-    return pd.DataFrame(rows, columns=["id", "claim", "verdicts", "number", "mean", "low", "high"])
-
-
-def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
-    """H_end, H_end_90, H [m], coverage [1] and width [m] of bands per family, method and N_D, over worlds.
-
-    At N_D = 0 errors are those of the physics alone. Columns: family, method, N_D; H, H_low, H_high: mean, least and
-    greatest over worlds of the means over members and seeds; so for the others; worlds (that have a result).
-    """
-    parts, keys, alike = [], ["family", "method", "N_D"], {"H_end": "A_end", "H_end_90": "A_end_90", "H": "A"}
-    numbers = [*alike, "coverage", "width"]
-    for results in worlds:
-        good = results.cells[results.cells["status"] == "ok"]
-        good = good.reindex(columns=[*keys, "foundation", *alike.values(), *numbers])
-        known = ~good["family"].isin([NO_MODEL, *fitted_families(results.plan)])
-        alone = good[known].drop_duplicates("foundation")
-        alone = alone.assign(N_D=0, method=NO_METHOD, coverage=np.nan, width=np.nan)
-        alone = alone.assign(**{error: alone[name] for error, name in alike.items()})
-        every = pd.concat([alone, good]).astype(dict.fromkeys(numbers, float))
-        parts.append(every.groupby(keys, sort=False)[numbers].mean().reset_index())
-    ends = {"": "mean", "_low": "min", "_high": "max"}
-    named = {f"{name}{end}": (name, how) for name in numbers for end, how in ends.items()}
-    return pd.concat(parts).groupby(keys, sort=False).agg(**named, worlds=("H", "size")).reset_index()

@@ -122,7 +122,8 @@ def identify_command(
     names = [PRESENT, *STRUCTURES] if structures == "all" else _split_paths([structures or ""])
     how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
     how |= {} if folds is None else {"folds": folds}
-    needless = [name for name, value in {"--profile": profile, "--design": design}.items() if value and structures]
+    alone = {"--profile": profile, "--design": design, "--html": html}
+    needless = [name for name, value in alone.items() if value and structures]
     if needless:
         raise ShipidError(
             "does not go with --structures: give it when you identify the structure chosen", path=needless[0]
@@ -136,7 +137,7 @@ def identify_command(
             )
         _diagnose_first(ship, log, runs or (), test or (), answer)
         if structures is not None:
-            _compare_structures(ship, log, declared, names, how, band, file, html, dataset, answer)
+            _compare_structures(ship, log, declared, names, how, band, file, answer)
             return
         with end_on_interrupt(), show_steps("cutting runs") as say:
             outcome = shipid.run_identification(
@@ -177,8 +178,6 @@ def _compare_structures(
     how: dict[str, Any],
     band: float | None,
     file: Path,
-    html: Path | None,
-    dataset: Path,
     answer: Answer,
 ) -> None:
     """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
@@ -190,10 +189,6 @@ def _compare_structures(
     _show_structures(compared, answer)
     written = write_chosen_structure(compared, file)
     answer.say(f"vessel with the structure {compared.chosen} -> {written}", chosen=compared.chosen, file=written)
-    if html is not None:
-        from shipid.report.structures import write_structures
-
-        answer.say_page(write_structures(compared.page(dataset, command_line()), html))
 
 
 def _show_structures(compared: StructureComparison, answer: Answer) -> None:
@@ -254,8 +249,6 @@ def _show_identified(outcome: Identification, answer: Answer) -> None:
     heads = {"set": "runs", "model": "model"} | MOTION
     errors = outcome.errors[outcome.errors["run"] == ALL]
     answer.records("free_runs", outcome.errors, heads, {"set": sets.__getitem__, **MOTION_FORMATS}, shown=errors)
-    heads = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before", "after": "after"}
-    answer.records("outputs", outcome.outputs, heads)
     _show_manoeuvres(outcome, answer)
     worth = outcome.solution.effective
     if worth:

@@ -10,61 +10,20 @@ import typer
 
 import shipid
 from shipid.cli.answer import Json, open_answer
-from shipid.cli.options import Changes, Trust, VesselName, command_line, document_stem, parse_changes
+from shipid.cli.options import Changes, StudyName, Trust, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, MOTION, MOTION_FORMATS
-from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.files import TABLES, write_table
+from shipid.errors import DataError, DocumentError
 
 
 def simulate_command(
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="STUDY|VESSEL",
-            help="bundled name or path of a study with a [truth]; with --manoeuvres of a vessel",
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Parquet file, of a vessel also CSV; default: <study>.parquet, <vessel>-simulated.csv"),
-    ] = None,
-    manoeuvres: Annotated[
-        str | None,
-        typer.Option(help="runs of a vessel: TOML file with [[manoeuvre]] blocks"),
-    ] = None,
+    study: StudyName,
+    out: Annotated[Path | None, typer.Option(help="Parquet file; default: <study>.parquet")] = None,
     changes: Changes = None,
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
-    """Simulate the truth of a study, or a vessel with manoeuvres drawn or given, into a log."""
-    if manoeuvres is None:
-        _simulate_truth(name, out, changes, trust, as_json)
-    elif changes:
-        raise ShipidError(f"changes a study alone: write the change into {manoeuvres}", path="--set")
-    else:
-        _simulate_vessel(name, manoeuvres, out or Path(f"{document_stem(name)}-simulated.csv"), as_json)
-
-
-def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
-    """A log of a vessel: manoeuvres by a document."""
-    from shipid.simulation.truth import simulate_script
-
-    check_output(out, endings=TABLES)
-    ship = shipid.load_vessel(vessel)
-    dataset = shipid.Dataset(
-        simulate_script(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
-    )
-    if out.suffix == ".parquet":
-        shipid.write_dataset(dataset, out)
-    else:
-        write_table(out, dataset.frame)
-    with open_answer(as_json) as answer:
-        answer.say_dataset(dataset, out)
-
-
-def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, trust: bool, as_json: bool) -> None:
-    """The dataset of a study, and its envelope beside the published one."""
+    """Simulate the truth of a study into a dataset, and print its envelope beside the published one."""
     from shipid.study.envelope import envelope_table, input_envelope
     from shipid.study.plan import input_files
     from shipid.study.prepare import obtain_runs, partition, runs_by_amount

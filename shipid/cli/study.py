@@ -28,14 +28,13 @@ from shipid.cli.outputs import check_output
 from shipid.cli.terminal import end_on_interrupt, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES, quote_argument, write_new
-from shipid.units import level_text, percent_text, plural_word
+from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
     from shipid.answer.compare import Comparison
     from shipid.study.plan import Plan
-    from shipid.study.results import Results
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
 MOST_DIFFERENCES = 20  # of documents, on a terminal
@@ -109,7 +108,7 @@ def study_screen(
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
-    """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
+    """Show how accurate many members of a study's families are on all its windows."""
     from shipid.engine.engines import REPEATED, check_device
     from shipid.study import screen
     from shipid.study.plan import input_files
@@ -129,14 +128,9 @@ def study_screen(
             blocks.append(block)
             say(f"{sum(map(len, blocks))} of {members * len(wanted)} members")
     frame = screen.join_blocks(blocks)
-    correlations = screen.drivers_of_accuracy(frame)
     with open_answer(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
         answer.records("accuracy", screen.accuracy_quantiles(frame))
-        if len(correlations):
-            answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
-        signs = dict.fromkeys(("factor", "away"), "{:+.2f}".format)
-        answer.records("drivers", correlations, formats=signs)
         answer.save(f"{len(frame)} members", file, frame)
 
 
@@ -304,23 +298,14 @@ def study_compare(
     out: Annotated[Path | None, typer.Option(help="file for a row per comparison: .csv or .parquet")] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare runs with the first one: what their documents differ in, and errors of equal cells, paired.
-
-    Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
-    errors over the worlds.
-    """
-    from shipid.answer import compare
-
+    """Compare runs with the first one: what their documents differ in, and errors of equal cells, paired."""
     if out is not None:
         check_output(out, endings=TABLES)
     matched = [one.partition("=") for one in pair or ()]
     if wrong := next(("".join(one) for one in matched if not all(one)), None):
         raise DocumentError(f"{wrong!r}: write --pair FIRST=OTHER, such as --pair instant=trained", path="--pair")
     with open_answer(as_json) as answer:
-        if pair is None and compare.are_worlds(folders):
-            errors = _show_worlds(compare.read_worlds(folders), answer)
-        else:
-            errors = _show_matched(compare.compare(folders, {first: other for first, _, other in matched}), answer)
+        errors = _show_matched(shipid.compare(folders, {first: other for first, _, other in matched}), answer)
         answer.save(f"{len(errors)} rows", out, errors)
 
 
@@ -352,25 +337,6 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     )
     answer.say("verdict: lower or higher where the test shows it, corrected for the rows of a run; empty: it does not")
     answer.say("\n".join(compared.notes), notes=compared.notes)
-    return errors
-
-
-def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
-    """Show findings, errors and bands of one study over several worlds; returns the errors."""
-    from shipid.answer.compare import compare_errors, compare_findings
-
-    errors = compare_errors(worlds)
-    heads = {"id": "finding", "verdicts": f"in {len(worlds)} worlds", "number": "number", "mean": "mean over worlds"}
-    answer.records("findings", compare_findings(worlds), heads | {"low": "95 % from", "high": "to"})
-    level = level_text(worlds[0].plan.study.bands.level)
-    answer.say(
-        "mean, least and greatest over the worlds of the error at the horizon [m], of H [m], its mean over the "
-        f"horizon, and of bands of {level}: share of whole test paths"
-    )
-    shown = {"H_end": "at the horizon [m]", "H_end_90": "nine in ten below [m]", "H": "H [m]", "coverage": "in band"}
-    for name, what in (*shown.items(), ("width", "radius of band [m]")):
-        numbers = {name: what, f"{name}_low": "least", f"{name}_high": "greatest", "worlds": "worlds"}
-        answer.records("errors", errors, CELL | numbers, shown=errors.dropna(subset=name))
     return errors
 
 

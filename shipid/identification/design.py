@@ -36,7 +36,7 @@ from shipid.vessel.load import Vessel
 MEASURED_ONCE = 1.0  # standard deviations of the signals: an initial state is known by its row alone
 UNKNOWN = 1.0  # standard deviation of a factor of which nothing is known
 SWING = 0.3  # of the shaft speed: how far it moves in speed runs
-WAVES, FARTHEST_HELM = 20.0, 35.0  # helm angles [deg]: of the multisine, and of any candidate
+FARTHEST_HELM = 35.0  # deg, of any candidate
 RUN = 20.0  # ship lengths at the speed of the approach that a run of excitation takes
 ANGLES: dict[str, tuple[tuple[float, ...], ...]] = {
     "zigzag": ((10.0, 10.0), (20.0, 20.0), (35.0, 20.0)),
@@ -78,7 +78,7 @@ def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tu
 def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float], most: float = np.inf) -> list[Candidate]:
     """Candidate manoeuvres at each approach speed [m/s] with at most 35 deg of helm and `most` rpm (or N) of the drive.
 
-    Zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in steps of the shaft.
+    Zigzags, turning circles, a pull-out, a stop, and a speed run in steps of the shaft.
     """
     length, result = vessel.length, []
     if length is None:
@@ -98,10 +98,8 @@ def _excitation_candidates(vessel: Vessel, speed: float, length: float, most: fl
     if swing <= 0:
         return
     how: dict[str, Any] = {"n_rpm": n_rpm, "amplitude_rpm": swing, "duration": RUN * passing}
-    steps = Excitation(signal="aprbs", hold=(2 * passing, 5 * passing), **how)
+    steps = Excitation(hold=(2 * passing, 5 * passing), **how)
     yield Candidate(f"speed run, {n_rpm:.3g} +- {swing:.2g} {unit}, {speed:.2g} m/s", steps)
-    waves = Excitation(signal="multisine", angle_deg=WAVES, period=RUN * passing, harmonics=(1, 12), **how)
-    yield Candidate(f"multisine, {WAVES:g} deg and {swing:.2g} {unit}, {speed:.2g} m/s", waves)
 
 
 def within_limits(manoeuvre: ApproachedManoeuvre, most: float) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,10 +14,8 @@ from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
 from shipid.arguments import as_names, check_class, check_function_or_none, check_number
-from shipid.data.checks import root_mean_square
-from shipid.data.dataset import Array, Dataset, stretches_of_runs, unit_of_column, without_shared_moments
+from shipid.data.dataset import Array, Dataset, without_shared_moments
 from shipid.data.held import constant_commands, warn_of_constant_commands
-from shipid.data.outputs import outputs_in_common, predicted_outputs
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
@@ -44,7 +41,6 @@ from shipid.identification.free_run import (
     check_length,
     missing_inputs,
     simulate_free_runs,
-    with_current,
 )
 from shipid.identification.plausible import implausibility
 from shipid.identification.profile import Profile, curvature_warning, profile_factor, profile_table, variance_ratio
@@ -80,7 +76,6 @@ from shipid.vessel.ranges import find_contradictions
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 WORSE = 0.02  # of the error of free runs before the fit: what is more by less is not worse
-ACCURATE = 0.03  # of a measured thrust or torque: its proposed standard deviation
 EXACT = 1e-3  # of its deviation: what a signal counts with that the vessel repeats exactly
 TRIED = tuple(sorted(TRIALS, key=lambda trial: trial[0] == "turning"))
 """Standard manoeuvres [deg] that both vessels perform in calm water: those that have criteria, turning last."""
@@ -108,7 +103,6 @@ class Identification(IdentificationContent):
     vessel : the base vessel. runs : those fitted. digest : of the dataset.
     estimates also has `with` (tied paths), `low`, `high` [unit], `factor_error`.
     curves : the profiles. programme : manoeuvres to run next, of `shipid.identification.design.rank_candidates`.
-    outputs : of components: `output`, `unit`, root mean square `measured`, and of the difference `before` and `after`.
     """
 
     vessel: Vessel
@@ -117,7 +111,6 @@ class Identification(IdentificationContent):
     runs: tuple[str, ...]
     digest: str
     curves: tuple[Profile, ...]
-    outputs: pd.DataFrame
 
     def page(self, dataset: str | Path, command: str = "") -> Identification:
         """The content of a page; dataset : file of the runs. command : command line that reproduces the outcome."""
@@ -299,7 +292,6 @@ def run_identification(
             )
         curved = curvature_warning(solution, dataset, judged, determined)
         _go_on(held)
-        outputs = _compare_outputs(pair, solution, dataset, fitted)
         if programme:
             ranked, lacking = _next_manoeuvres(identified, dataset, fitted, solution, judged)
         warnings = (
@@ -317,7 +309,6 @@ def run_identification(
                 if path not in determined
             ),
             *_implausible_estimates(vessel, identified, solution.values),
-            *_unused_output_warnings(outputs, settings),
             lacking,
             refused and f"no bands on standard manoeuvres: {refused}",
         )
@@ -353,7 +344,6 @@ def run_identification(
             profiles=pd.concat([pd.DataFrame(), *map(profile_table, curves)], ignore_index=True),
             warnings=tuple(filter(None, warnings)),
             beyond=extrapolation_sentences(identified, done, dataset, fitted),
-            outputs=outputs,
         )
 
 
@@ -389,38 +379,6 @@ def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[s
         if not judgements.get(path)
     }
     return tuple(filter(None, judgements.values()))
-
-
-def _compare_outputs(
-    pair: Mapping[str, Vessel], solution: Solution, dataset: Dataset, runs: Sequence[str]
-) -> pd.DataFrame:
-    """Measured outputs against those of the vessels, in the recorded motion; as the free runs are, in the current."""
-    part, current = dataset.select(runs), solution.common_current
-    names, predicted = outputs_in_common(pair[AFTER], part), dict[str, pd.DataFrame]()
-    measured = pd.concat([rows for _, rows in stretches_of_runs(part)], ignore_index=True)
-    for name, vessel in pair.items() if names else ():
-        known = any(current) and name == AFTER
-        flow = {"V_c": math.hypot(*current), "beta_c": math.atan2(*current[::-1])} if known else {}
-        sea = with_current(vessel, solution.settings, (), current)[0] if known else vessel
-        predicted[name] = predicted_outputs(sea, part, flow)
-
-    def level(values: pd.Series[float]) -> float:
-        each = [root_mean_square(np.asarray(one)) for _, one in values.groupby(measured["run"], sort=False)]
-        return float(np.sqrt((pd.Series(each) ** 2).mean()))
-
-    rows = [
-        {"output": output, "unit": unit_of_column(output), "measured": level(measured[output])}
-        | {name: level(measured[output] - table[output]) for name, table in predicted.items()}
-        for output in names
-    ]
-    return pd.DataFrame(rows, columns=["output", "unit", "measured", *pair])
-
-
-def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
-    for row in outputs.to_dict("records"):
-        if row["output"] not in settings.weights:
-            name, width = row["output"], f"{ACCURATE * row['measured']:.2g}"
-            yield f"{name} was measured and is not fitted: --set weights.{name}={width} [{row['unit']}]"
 
 
 def _go_on(held: Sequence[int]) -> None:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, Field, FiniteFloat, PositiveInt
+from pydantic import AfterValidator, BaseModel, Field, FiniteFloat
 
 from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.errors import DocumentError, suggest_name
@@ -25,7 +25,7 @@ from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls
-from shipid.simulation.excitation import aprbs_series, deal_harmonics, limit_rate, multisine_series
+from shipid.simulation.excitation import aprbs_series, limit_rate
 from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import DEGREE, RPM
 from shipid.vessel.perturb import check_rising
@@ -468,21 +468,14 @@ class CrashStop(TimedManoeuvre, Trial):
 
 
 class Excitation(TimedManoeuvre):
-    """Helm and shaft move about zero and n_rpm by a multisine or by random levels (APRBS), within rate limits."""
+    """Helm and shaft move about zero and n_rpm by random levels (APRBS), within rate limits."""
 
-    signal: Literal["multisine", "aprbs"]
     angle_deg: Annotated[NotNegative, Field(le=MOST_HELM, description="deg, greatest helm; 0: not moved")] = 0.0
     amplitude_rpm: Annotated[NotNegative, Field(description="rpm about n_rpm at most; 0: not moved")] = 0.0
-    period: Annotated[Positive, Field(description="s, of the multisine")] = 200.0
-    harmonics: Annotated[
-        tuple[PositiveInt, PositiveInt],
-        AfterValidator(check_rising),
-        Field(description="lowest and highest of the multisine; assigned alternately to helm and shaft"),
-    ] = (1, 20)
-    hold: Annotated[Hold, Field(description="s, least and most of an APRBS level")] = (5.0, 20.0)
+    hold: Annotated[Hold, Field(description="s, least and most of a level")] = (5.0, 20.0)
     angle_rate_deg: Annotated[Positive | None, Field(description="deg/s, limit of the ordered helm")] = None
     shaft_rate_rpm: Annotated[Positive | None, Field(description="rpm/s, limit of the ordered shaft")] = None
-    seed: Annotated[int, Field(description="of the levels, and of the search for phases")] = 0
+    seed: Annotated[int, Field(description="of the levels")] = 0
 
     @property
     def greatest_orders(self) -> tuple[float, float]:
@@ -505,14 +498,7 @@ class Excitation(TimedManoeuvre):
             return series
         key = (self.seed, "excitation", channel)
         time = t[after] - self.execute_at
-        if self.signal == "aprbs":
-            series[after] = aprbs_series(time, hold=self.hold, levels=(-amplitude, amplitude), key=key)
-        else:
-            band = range(self.harmonics[0], self.harmonics[1] + 1)
-            harmonics = deal_harmonics(band, 2)[channel] if self.angle_deg and self.amplitude_rpm else band
-            series[after] = multisine_series(
-                time, period=self.period, harmonics=harmonics, amplitude=amplitude, key=key
-            )
+        series[after] = aprbs_series(time, hold=self.hold, levels=(-amplitude, amplitude), key=key)
         if rate is None or len(t) < 2:
             return series
         return np.asarray(limit_rate(np.concatenate([[0.0], series]), float(t[1] - t[0]), rate)[1:])

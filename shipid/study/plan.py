@@ -188,11 +188,6 @@ def _shared_pairs(
     return [tuple(cells) for cells in groups.values()]
 
 
-def digest_without_seed(plan: Plan) -> str:
-    """Digest of a study without its top-level seed: equal for repetitions in other worlds."""
-    return replace(plan, document={key: value for key, value in plan.document.items() if key != "seed"}).digest
-
-
 def vessels_of(plan: Plan) -> list[Vessel]:
     """The vessel of the truth, if there is one, and the bases of the foundations, of all parts too."""
     every = (plan.truth, *(foundation.base for foundation in plan.foundations))

@@ -11,16 +11,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import kendalltau
 
 from shipid.arguments import check_choice, check_class, check_whole_number
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, suggest_name
-from shipid.evidence import SIGNIFICANT, holm_correction
 from shipid.hybrid.physics import Physics, check_columns
-from shipid.metrics import BINS, position_error, rank_correlation, summarise_errors, tally_quantile
+from shipid.metrics import BINS, position_error, summarise_errors, tally_quantile
 from shipid.study.new import proposed_horizon, survey_dataset
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of, window_memory
@@ -33,7 +31,6 @@ MEMBERS_OF_BLOCK = 512  # of a block
 # Sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many.
 NUMBERS_OF_BLOCK = 12_000_000
 QUANTILES_OF_A = (0.05, 0.25, 0.5, 0.75, 0.95)
-MOST_DRIVERS = 5  # of a family that are named
 PER_HORIZON = 8  # instants of prediction in one horizon, of ranks by a log
 ROW_COLUMNS = ("family", "member", "A", "A_90", "diverged")
 
@@ -179,25 +176,3 @@ def accuracy_quantiles(frame: pd.DataFrame) -> pd.DataFrame:
     A = frame.groupby("family", sort=False)["A"]
     counts = {"members": A.size(), "diverged": frame["diverged"].gt(0).groupby(frame["family"], sort=False).sum()}
     return pd.DataFrame(counts | {share: A.quantile(share) for share in QUANTILES_OF_A}).reset_index()
-
-
-def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
-    """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
-
-    A row each for the largest that chance hardly makes: family, paths (those drawn together count once), factor, away.
-    Chance is judged by Kendall's rank correlation, exact for few members, corrected for the pairs of a family.
-    """
-    rows: list[tuple[Any, ...]] = []
-    for name, part in frame.groupby("family", sort=False):
-        A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), list[tuple[Any, ...]]()
-        for path in frame.columns.difference(list(ROW_COLUMNS), sort=False):
-            if part[path].nunique() > 1:
-                alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
-        pairs = {", ".join(paths): (part[paths[0]], (part[paths[0]] - 1).abs()) for paths in alike.values()}
-        chances = [kendalltau(A, values).pvalue for pair in pairs.values() for values in pair]
-        corrected = holm_correction(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2)  # nan: all are as far from 1
-        for (named, pair), least in zip(pairs.items(), corrected.min(axis=1), strict=True):
-            if least <= 2 * SIGNIFICANT:  # of both sides
-                driving.append((name, named, *(rank_correlation(A, values.to_numpy()) for values in pair)))
-        rows += sorted(driving, key=lambda row: -max(abs(row[2]), abs(row[3])))[:MOST_DRIVERS]
-    return pd.DataFrame(rows, columns=["family", "paths", "factor", "away"])

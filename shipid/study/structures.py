@@ -9,7 +9,7 @@ manoeuvres: those that are as good on the runs may differ there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,6 @@ from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
-from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import MeasuredManoeuvre
 from shipid.study.new import proposed_horizon, survey_dataset
 from shipid.version import __version__
@@ -69,31 +68,36 @@ class FittedStructure:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StructureComparison(StructuresContent):
-    """Result of a comparison of structures: the content of its page, and more.
+class StructureComparison:
+    """Result of a comparison of structures.
 
+    sentences : on the structure chosen, the reason, and notes. chosen : its name.
+    errors : `structure`, `set` (`folds`, `test`), `run` (`all` at first), RMS `u`, `v` [m/s], `r` [rad/s], `position`
+        [m] of runs that the fit has not seen.
+    table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
+        runs; `more`, `low`, `high`: difference of the position to the chosen one with its interval; `equal`: whether
+        it is not shown to be worse, corrected for how many there are (Holm), and says something; `note`.
+    manoeuvres : `manoeuvre`, `measure`, `unit`, `structure`, `value`, `low`, `high`, `note`.
+    spread : `manoeuvre`, `measure`, `unit`, `least`, `greatest` over the structures that are equally good, `spread`
+        and `width`, the greatest width of the interval within one of them.
     vessel : the base. runs, test : of the folds, and held out of all. digest : of the dataset. shared : warnings of
-    runs that share moments with those held out. fits : structure -> the fit to all runs; structures that could not be
-    fitted are missing.
+        runs that share moments with those held out. ahead : length of a free run [s], 0: whole runs.
+    fits : structure -> the fit to all runs; structures that could not be fitted are missing.
     """
 
+    sentences: Sequence[str]
+    table: pd.DataFrame
+    errors: pd.DataFrame
+    manoeuvres: pd.DataFrame
+    spread: pd.DataFrame
+    chosen: str
+    ahead: float
     vessel: Vessel
     runs: tuple[str, ...]
     test: tuple[str, ...]
     digest: str
     shared: tuple[str, ...]
     fits: Mapping[str, FittedStructure]
-
-    def page(self, dataset: str | Path, command: str = "") -> StructureComparison:
-        """The content of a page; dataset : file of the runs. command : command line that reproduces the comparison."""
-        origin = {
-            "Vessel": f"{self.vessel.name}, digest {self.vessel.digest}",
-            "Dataset": f"{dataset}, digest {self.digest}",
-            "Runs": ", ".join(self.runs),
-            "Held out of all": ", ".join(self.test) or "none",
-            "shipid": __version__,
-        }
-        return replace(self, provenance=origin, command=command, study_document=self.document())
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
@@ -185,8 +189,6 @@ def compare_structures(
         table.loc[table["structure"] == name, ["equal", "note"]] = False, silent[name]
     spread = _spread_of_measures(manoeuvres, [name for name in equal if name not in silent])
     return StructureComparison(
-        title=f"{vessel.name}: structures of the hull",
-        name=vessel.key,
         sentences=_comparison_sentences(table, spread, silent, fitted, length, far),
         vessel=vessel,
         runs=fitted,
@@ -198,14 +200,12 @@ def compare_structures(
             *unrecorded_time_warning(dataset, fitted, settings),
         ),
         ahead=length,
-        level=level,
         errors=every,
         table=table,
         chosen=chosen,
         fits=fits,
         manoeuvres=manoeuvres,
         spread=spread,
-        cautions={name: fit.caution for name, fit in fits.items()},
     )
 
 

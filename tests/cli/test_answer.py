@@ -35,7 +35,7 @@ def test_lists_and_one_vessel() -> None:
 
 def test_studies(study: Path, tiny_run: Path) -> None:
     screened = answered("study", "screen", study, "--members", 3)
-    assert {"accuracy", "drivers", "file"} == set(screened)
+    assert {"accuracy", "file"} == set(screened)
     assert answered("study", "check", tiny_run)["faults"] == []
     made = answered("simulate", study)
     assert made["runs"] == 12

@@ -175,11 +175,6 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         | {"approach": "rest"},
     ),
     "simulate": (
-        "shipid.simulation.truth:simulate_script",
-        f"simulate {SHIP} --manoeuvres runs.toml",
-        {"vessel": is_ship, "name": "runs.toml"},
-    ),
-    "simulate a study": (
         "shipid.study.prepare:obtain_runs",
         f"simulate {STUDY} --set grid.N_D=[5]",
         {"plan": is_changed},

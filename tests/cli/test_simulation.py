@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from shipid.data.dataset import read_dataset
-from shipid.errors import ShipidError
 from tests.cli.running import ended, output_of
 
 
@@ -52,18 +50,3 @@ def test_simulate_writes_the_runs_and_shows_their_envelope(study: Path) -> None:
     assert f"{len(dataset.frame)} rows in {len(dataset.runs)} runs -> runs.parquet" in text
     assert len(dataset.runs) == 12
     assert re.search(r"^ *test +u +m/s +-?\d\S* +-?\d\S* +-?\d\S*$", text, re.MULTILINE)
-
-
-def test_simulate_writes_a_log_of_a_vessel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Given manoeuvres, as CSV and as a dataset that measures them."""
-    monkeypatch.chdir(tmp_path)
-    run = '[[manoeuvre]]\nkind = "zigzag"\nn_rpm = 80\nangle_deg = 20\nexecute_heading_deg = 20\nduration = 200\n'
-    Path("runs.toml").write_text("step = 0.5\n" + run)
-    text = output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.csv")
-    assert "201 rows in 1 run -> log.csv" in text
-    output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--out", "log.parquet")
-    log = pd.read_csv("log.csv")
-    np.testing.assert_allclose(log["psi"], read_dataset(Path("log.parquet")).frame["psi"], rtol=1e-12)
-    assert np.abs(log["psi"]).max() > np.radians(20)
-    with pytest.raises(ShipidError, match="changes a study"):
-        output_of("simulate", "mariner", "--manoeuvres", "runs.toml", "--set", "step=1")

@@ -40,10 +40,6 @@ def test_screen_writes_a_row_per_member(study: Path) -> None:
     assert shown
     expected = np.quantile(frame["A"], [0.05, 0.25, 0.5, 0.75, 0.95])
     np.testing.assert_allclose([float(word) for word in shown[1].split()], expected, atol=0.001)
-    assert "what drives A" not in text
-    many = output_of("study", "screen", study, "--members", "300", "--out", "many.csv")
-    listed = re.findall(r"^ *wrong +hull\.derivatives\.\S+ +[+-]\d\.\d\d +[+-]\d\.\d\d *$", many, re.MULTILINE)
-    assert 1 <= len(listed) <= 5
     output_of("study", "screen", study, "wrong", "--members", "2", "--out", "new/rows.parquet")
     pd.testing.assert_frame_equal(pd.read_parquet("new/rows.parquet"), frame[:2], rtol=1e-12)
     for arguments, remedy in (

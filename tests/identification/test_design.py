@@ -114,7 +114,7 @@ def test_what_the_ship_cannot_perform_is_left_out_and_the_others_are_as_they_wer
         (Zigzag(n_rpm=100, duration=60), 20, 100),
         (Spiral(n_rpm=100, hold=60), 25, 100),
         (CrashStop(n_rpm=100, astern_rpm=130, duration=60), 0, 130),
-        (Excitation(signal="aprbs", n_rpm=100, amplitude_rpm=20, angle_deg=12, duration=60), 12, 120),
+        (Excitation(n_rpm=100, amplitude_rpm=20, angle_deg=12, duration=60), 12, 120),
     ],
 )
 def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, helm: float, rpm: float) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,7 +10,6 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
-from shipid.identification.outcome import _compare_outputs
 from shipid.identification.residuals import Problem, build_problem, predict_residuals
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
@@ -57,7 +54,6 @@ def trials(seed: int = 1, steady: bool = False) -> Dataset:
     kinds = [
         Excitation(
             name=f"S{n}",
-            signal="aprbs",
             n_rpm=n,
             amplitude_rpm=0.0 if steady else 0.2 * n,
             angle_deg=0.0 if steady else 15.0,
@@ -75,23 +71,6 @@ def trials(seed: int = 1, steady: bool = False) -> Dataset:
 
 def ship_outputs() -> tuple[str, ...]:
     return ("propeller.thrust", "propeller.torque", "rudder.normal_force")
-
-
-@pytest.mark.parametrize("current", [(0.2, 0.1), (-0.1, 0.25)])
-def test_outputs_are_compared_in_the_current_of_all_runs(current: tuple[float, float]) -> None:
-    """A ship of the same numbers repeats its thrust exactly, once its speed through the water is known."""
-    ship = tanker().with_values({"current.kind": "uniform"})
-    kinds = [Excitation(name="S", signal="aprbs", n_rpm=400.0, angle_deg=15.0, duration=60.0, hold=(10.0, 20.0))]
-    flow = {"V_c": np.array([np.hypot(*current)]), "beta_c": np.array([np.arctan2(*current[::-1])])}
-    frame = perform_manoeuvres(ship, kinds, step=1.0, outputs=list(ship_outputs()), environment=flow)
-    kept = [name for name in frame if not str(name).startswith("actual.") and name not in flow]
-    log = Dataset(frame[kept], {"clock": "run", "flags": []})
-    found: Any = SimpleNamespace(common_current=current, settings=SPEED)
-    compared = _compare_outputs({"before": tanker(), "after": tanker()}, found, log, log.runs)
-    compared = compared[compared["output"] != "rudder.normal_force"]  # its gear moves between the rows
-    assert len(compared) == 2
-    assert (compared["after"] < 1e-6 * compared["measured"]).all()
-    assert (compared["before"] > 0.02 * compared["measured"]).all()
 
 
 def with_weights(settings: Identify, *names: str) -> Identify:

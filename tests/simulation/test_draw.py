@@ -26,7 +26,7 @@ BLOCKS: dict[str, dict[str, Any]] = {
     "zigzag": {**SHAFT, "angle_deg": [10.0, 30.0], "side": ["starboard", "port"], "approach": "rest"},
     "spiral": {**SHAFT, "hold": 4.0, "angles_deg": [20.0, -20.0, 5.0]},
     "crash_stop": {**SHAFT, "astern_rpm": [50.0, 100.0], "execute_at": [0.0, 5.0]},
-    "excitation": {**SHAFT, "signal": "aprbs", "angle_deg": 15.0, "hold": [2.0, 6.0]},
+    "excitation": {**SHAFT, "angle_deg": 15.0, "hold": [2.0, 6.0]},
 }
 
 
@@ -111,8 +111,7 @@ def test_pairs_are_drawn_where_a_number_is_wanted() -> None:
         ({"kind": "zigzag"}, "n_rpm: missing"),
         ({"kind": "steps", **SHAFT, "hold": [5.0]}, "hold.1: missing"),
         ({"kind": "steps", **SHAFT, "hold": [20.0, 5.0]}, r"hold: low > high: give \[low, high\]"),
-        ({"kind": "excitation", "signal": "aprbs", **SHAFT, "hold": [20.0, 5.0]}, "hold: low > high"),
-        ({"kind": "excitation", "signal": "multisine", **SHAFT, "harmonics": [20, 1]}, "harmonics: low > high"),
+        ({"kind": "excitation", **SHAFT, "hold": [20.0, 5.0]}, "hold: low > high"),
         ({"kind": "steps", "n_rpm": [1.0, True]}, "n_rpm: give a number"),
         ({"kind": "turning", "share": 0.0, **SHAFT}, "must be above 0"),
     ],

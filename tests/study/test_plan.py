@@ -22,7 +22,6 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.plan import (
     _sources,
     build_plan,
-    digest_without_seed,
     drawn_conditions,
     fitted_families,
     input_files,
@@ -138,9 +137,6 @@ def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path:
         if one.variant and other.variant and one.variant.values:
             assert all(one.variant.values[path] != other.variant.values[path] for path in one.variant.values)
     assert there.digest != here.digest
-    assert digest_without_seed(there) == digest_without_seed(here)
-    other = tiny_plan(tmp_path, {**changes, "method.0.steps": 7})
-    assert digest_without_seed(other) != digest_without_seed(here)
 
 
 def test_a_stored_world_is_the_same_world(tmp_path: Path) -> None:

@@ -483,7 +483,7 @@ def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
         {"kind": "zigzag", "n_rpm": 150.0},
         {"kind": "turning", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
         {"kind": "turning_circle", "n_rpm": 150.0},
-        {"kind": "excitation", "n_rpm": [100.0, 200.0], "angle_deg": 20.0, "signal": "aprbs"},
+        {"kind": "excitation", "n_rpm": [100.0, 200.0], "angle_deg": 20.0},
         {"kind": "steps", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
     ]
     for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM, RANDOM], strict=True):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 from shipid.engine import engines, native
 from shipid.errors import DocumentError, ShipidError
@@ -20,7 +19,6 @@ from shipid.study.prepare import obtain_runs, partition, window_memory
 from shipid.study.screen import (
     accuracy_quantiles,
     drawn_families,
-    drivers_of_accuracy,
     join_blocks,
     screen,
 )
@@ -94,32 +92,6 @@ def test_a_member_that_diverges_errs_as_in_a_study_and_is_counted(tmp_path: Path
     np.testing.assert_allclose(frame["A_90"], [row["p90"] for row in expected], rtol=2e-3)
     assert (frame["diverged"] <= 1).all()
     assert accuracy_quantiles(frame)["diverged"].item() == bad.sum()
-
-
-def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
-    """Two numbers drawn together count once; one that matters is listed before one that does not."""
-    rules = [
-        {"parameters": ["thruster.*.D_p"], "factor": [0.5, 1.5], "together": True},
-        {"parameters": ["hull.derivatives.X_rr"], "factor": [0.99, 1.01]},
-    ]
-    family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": rules}]
-    ranking = drivers_of_accuracy(screened(tiny_plan(tmp_path, {"family": family}), 24))
-    assert list(ranking["paths"]) == ["thruster.port.D_p, thruster.starboard.D_p"]
-    assert ranking["away"][0] > 0.8  # too large and too small are wrong alike
-    assert abs(ranking["factor"][0]) < ranking["away"][0]
-
-
-@pytest.mark.parametrize("members", [2, 100])
-def test_chance_drives_nothing(members: int) -> None:
-    """100 families of 8 factors that A knows nothing of: two members had correlations of 1, and were believed."""
-    rng = np.random.default_rng(members)
-    columns = {f"p{number}": rng.uniform(0.5, 1.5, 100 * members) for number in range(8)}
-    A = rng.lognormal(size=100 * members)
-    family = np.repeat([f"f{number}" for number in range(100)], members)
-    frame = pd.DataFrame({"family": family, "member": family, "A": A, "A_90": A, "diverged": 0.0} | columns)
-    assert drivers_of_accuracy(frame)["family"].nunique() <= stats.binom.ppf(0.999, 100, 0.05)
-    driven = drivers_of_accuracy(frame.assign(A=A * frame["p3"] ** 12)).groupby("family", sort=False)["paths"].first()
-    assert members < 100 or (len(driven), set(driven)) == (100, {"p3"})
 
 
 @pytest.mark.parametrize(
