@@ -51,7 +51,7 @@ def mirrored_sides(values: Array, reflection: Array | None) -> Array:
     return np.stack([values] if reflection is None else [values, values @ reflection])
 
 
-def weighed_kernels(sides: Array, centres: Array, linear: float, weights: Array) -> Array:
+def weighed_kernels(sides: Array, centres: Array, linear: float, weights: Array) -> Any:
     """Kernels exp(-|z - c|^2 / 2) + l (1 + z c) times weights (C, R): outputs (S, R) of windows.
 
     sides : (K, S, d), windows as they are and, where there is a mirror, their images. centres : (C, d). Both are
