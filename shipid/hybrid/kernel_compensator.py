@@ -31,20 +31,19 @@ def kernel_group(name: str) -> str:
     return "position" if name[-2:] in (".x", ".y") else "turned" if name.startswith("turned") else group
 
 
-def with_constant(values: Any, maths: Any = np) -> Any:
+def with_constant(values: Array) -> Array:
     """Values (..., d + 1): those given, and 1."""
-    return maths.concatenate((values, maths.ones_like(values[..., :1])), -1)
+    return np.concatenate((values, np.ones_like(values[..., :1])), -1)
 
 
-def bell_values(points: Any, centres: Any, maths: Any = np) -> Any:
+def bell_values(points: Array, centres: Array) -> Array:
     """exp(-|z - c|^2 / 2) (..., S, C), points (..., S, d) and centres (C, d) divided by their scales.
 
     The exponent is one product of matrices, [z, 1, -|z|^2 / 2] [c, -|c|^2 / 2, 1]^T.
     """
     near, far = ((one**2).sum(-1)[..., None] / -2 for one in (points, centres))
-    left = maths.concatenate((with_constant(points, maths), near), -1)
-    values = left @ with_constant(maths.concatenate((centres, far), -1), maths).T
-    return maths.exp(values, out=values)
+    values = np.concatenate((with_constant(points), near), -1) @ with_constant(np.concatenate((centres, far), -1)).T
+    return np.exp(values, out=values)
 
 
 def mirrored_sides(values: Array, reflection: Array | None) -> Array:
@@ -52,14 +51,14 @@ def mirrored_sides(values: Array, reflection: Array | None) -> Array:
     return np.stack([values] if reflection is None else [values, values @ reflection])
 
 
-def weighed_kernels(sides: Any, centres: Any, linear: Any, weights: Any, maths: Any = np) -> Any:
+def weighed_kernels(sides: Array, centres: Array, linear: float, weights: Array) -> Any:
     """Kernels exp(-|z - c|^2 / 2) + l (1 + z c) times weights (C, R): outputs (S, R) of windows.
 
     sides : (K, S, d), windows as they are and, where there is a mirror, their images. centres : (C, d). Both are
     divided by their scales. The linear kernel goes through the few inputs, not through the centres.
     """
-    slopes = linear * (with_constant(centres, maths).T @ weights)
-    values = bell_values(sides, centres, maths) @ weights + with_constant(sides, maths) @ slopes
+    slopes = linear * (with_constant(centres).T @ weights)
+    values = bell_values(sides, centres) @ weights + with_constant(sides) @ slopes
     values[1:, :, weights.shape[1] // 2 :] *= -1
     return values.sum(0)
 
@@ -89,19 +88,18 @@ class KernelCompensator(PathCorrector):
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
-        z, terms = self.normaliser.apply(table), self.basis.shape[1]
-        total: Any = 0.0
-        for one in self.members:
-            centres = self.centres / one.scales
-            total = total + _kernel_values(z / one.scales, centres, one.linear) @ one.weights
-            if self.reflection is not None:
-                image = _kernel_values(z @ self.reflection / one.scales, centres, one.linear) @ one.weights
-                total = total + np.repeat([1.0, -1.0], terms) * image
+        z, signs = self.normaliser.apply(table), np.repeat([1.0, -1.0], self.basis.shape[1])
+        sides = [(1.0, z)] if self.reflection is None else [(1.0, z), (signs, z @ self.reflection)]
+        total: Any = sum(
+            sign * _weighed_values(points / one.scales, self.centres / one.scales, one)
+            for one in self.members
+            for sign, points in sides
+        )
         return weigh_shapes(self.basis, total / len(self.members))
 
 
-def _kernel_values(points: Any, centres: Array, linear: float) -> Any:
-    """exp(-|z - c|^2 / 2) + l (1 + z c) (S, C), by what arrays of CasADi have, too."""
-    product = points @ centres.T
-    values = product - (points**2).sum(-1).reshape(-1, 1) / 2 - (centres**2).sum(-1) / 2
-    return np.exp(values) + linear * (1 + product)
+def _weighed_values(points: Any, centres: Array, one: KernelMember) -> Any:
+    """Kernels exp(-|z - c|^2 / 2) + l (1 + z c) times weights (S, 2 r), by what arrays of CasADi have, too."""
+    exponent = points @ centres.T - (points**2).sum(-1).reshape(-1, 1) / 2 - (centres**2).sum(-1) / 2
+    slopes = points @ (centres.T @ one.weights) + one.weights.sum(0)
+    return np.exp(exponent) @ one.weights + one.linear * slopes

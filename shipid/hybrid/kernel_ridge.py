@@ -1,7 +1,8 @@
-"""Kernel ridge regression in PyTorch: the error of every run left out in closed form, its slope, and descents on it.
+"""Kernel ridge regression: the error of every run left out in closed form, its slope, and descents on it.
 
 With G = (K + ridge)^-1 and a = G targets, what a fit without a block b misses of it is e_b = G_bb^-1 a_b, and its
-weights are a - G_:b e_b (Rasmussen and Williams, 2006, section 5.4.2).
+weights are a - G_:b e_b (Rasmussen and Williams, 2006, section 5.4.2). Products and exponentials are NumPy's, which
+take less time than PyTorch's on AMD and Intel; factors and inverses of large matrices are PyTorch's.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from scipy.optimize import minimize
-from torch import Tensor
 
 from shipid.data.windows import part_of_runs
 from shipid.hybrid.compensator import unflatten_paths
@@ -48,22 +49,20 @@ class KernelProblem(PathProblem):
         self.varying = VaryingInputs.of(self.rows(self.windows), method.mirror)
         self.scales = [f"{kernel_group(name)}_scale" for name in self.varying.normaliser.names]
         values, reflection = self.varying.normaliser.apply(self.table), self.varying.reflection
-        self.values, self.sides = self._tensor(values), self._tensor(mirrored_sides(values, reflection))  # (K, S, d)
+        self.values, self.sides = values, mirrored_sides(values, reflection)  # (S, d), (K, S, d)
         apart = self.weights.T.reshape(len(self.sides), -1, *self.weights.T.shape[1:])  # x and y, or both together
-        self.outputs = self._tensor(np.concatenate([*apart.swapaxes(0, 1)], axis=2))  # (K, S, R)
+        self.outputs = np.concatenate([*apart.swapaxes(0, 1)], axis=2)  # (K, S, R)
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
         self.parts = min(method.trials, len(task.folds))
         self.few = self.parts > 1 and len(task.folds) < FOLDS_OF_PART * method.trials
 
-    def _tensor(self, values: Any) -> Tensor:
-        return torch.as_tensor(values, dtype=torch.float64, device=self.task.device)
-
-    def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> Tensor:
+    def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> Array:
         """Kernels (K, S, C) between windows, with the settings of a trial: those of x and of y, or one of both."""
-        scales = self._tensor([settings[name] for name in self.scales])
+        scales = np.array([settings[name] for name in self.scales])
         sides, around = self.sides[:, points] / scales, self.values[centres] / scales
-        plane = (settings["linear"] * with_constant(sides, torch)) @ with_constant(around, torch).T
-        return mirror_sums(plane + bell_values(sides, around, torch))
+        whole = bell_values(sides, around)
+        whole += (settings["linear"] * with_constant(sides)) @ with_constant(around).T
+        return mirror_sums(whole)
 
     def folds_left_out(self, number: int) -> list[tuple[Index, Index]]:
         """Folds that a trial leaves out of its choice of scales."""
@@ -81,22 +80,22 @@ class KernelProblem(PathProblem):
         rows = seen[part_of_runs(self.task.windows.run[seen], self.method.search_windows)]
         idle = {name for name in point if name.endswith("_scale")} - {*self.scales}
         ranges, point = ({k: v for k, v in table.items() if k not in idle} for table in (self.method.ranges(), point))
-        blocks, names = FoldBlocks(folds, rows, self.task.device), list(ranges)
+        blocks, names = FoldBlocks(folds, rows), list(ranges)
         prior = PRIOR / len(np.unique(self.task.windows.run[rows]))
         start, ends = (np.log([table[name] for name in names]) for table in (point, ranges))
         values, sides, outputs = self.values[rows], self.sides[:, rows], self.outputs[:, rows]
         groups = list(dict.fromkeys(self.scales))
-        of_group = self._tensor(np.array(groups)[:, None] == self.scales)  # (G, d)
+        of_group = np.array(groups)[:, None] == self.scales  # (G, d)
 
         def value_and_slope(logs: Array) -> tuple[float, Array]:
             settings = {**point, **dict(zip(names, np.exp(logs), strict=True))}
-            scales, linear = self._tensor([settings[name] for name in self.scales]), settings["linear"]
-            z, images = values / scales, with_constant(sides / scales, torch)
-            bell, plane = bell_values(images[..., :-1], z, torch), with_constant(z, torch)
+            scales, linear = np.array([settings[name] for name in self.scales]), settings["linear"]
+            z, images = values / scales, with_constant(sides / scales)
+            bell, plane = bell_values(images[..., :-1], z), with_constant(z)
             whole = mirror_sums(bell + (linear * images) @ plane.T)
-            whole.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
+            np.einsum("kii->ki", whole)[:] += settings["ridge"]
             missed, slope = blocks.errors_and_slope(whole, outputs)
-            by_ridge, plain = slope.diagonal(dim1=1, dim2=2).sum(), mirror_sums(slope)
+            by_ridge, plain = np.trace(slope, axis1=1, axis2=2).sum(), mirror_sums(slope)
             bell *= plain
             by_linear = linear * (images * (plain @ plane)).sum((0, 1))
             by_input = (images[..., :-1] * (bell @ z)).sum((0, 1)) + by_linear[:-1]
@@ -114,30 +113,30 @@ class KernelProblem(PathProblem):
         chosen = {**point, **dict(zip(names, map(float, values), strict=True))}
         return float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)
 
-    def solve(self, settings: Mapping[str, Any], folds: Sequence[tuple[Index, Index]]) -> list[Tensor]:
+    def solve(self, settings: Mapping[str, Any], folds: Sequence[tuple[Index, Index]]) -> list[Array]:
         """Weights (C, K R) of a solution, and of those without each fold.
 
         Centres that any fold leaves out come last in the Cholesky factor, [[L, 0], [A, B]]: the last block of G is then
         the inverse of B B^T, and what is above it is -L^-T A^T times that.
         """
-        outs = np.array([~np.isin(self.part, kept) for kept in (self.part, *(training for training, _ in folds))])
+        outs = ~windows_within((self.part, *(training for training, _ in folds)), self.part)
         order, first = np.argsort(outs.any(axis=0), kind="stable"), int((~outs.any(axis=0)).sum())
         part = self.part[order]
-        kernel = self.kernels(part, part, settings)
+        kernel = torch.from_numpy(self.kernels(part, part, settings))
         kernel.diagonal(dim1=1, dim2=2).add_(settings["ridge"])
         factor = torch.linalg.cholesky(kernel)
-        weights = torch.cholesky_solve(self.outputs[:, part], factor)
+        weights = torch.cholesky_solve(torch.from_numpy(self.outputs[:, part]), factor)
         inverse, last = torch.cholesky_inverse(factor[:, first:, first:]), weights[:, first:]
         places = map(np.flatnonzero, outs[:, order[first:]])
         parts = [inverse[:, :, b] @ torch.linalg.solve(inverse[:, b][:, :, b], last[:, b]) for b in places]
         below, left = torch.cat(parts, dim=2), factor[:, :, :first].mT  # L^T beside A^T
         above = torch.linalg.solve_triangular(left[:, :, :first], left[:, :, first:] @ below, upper=True)
-        changes = torch.chunk(torch.cat([-above, below], dim=1), len(parts), dim=2)
-        return [torch.cat([*(weights - change)[:, np.argsort(order)]], dim=1) for change in changes]
+        every = weights.repeat(1, 1, len(parts)) - torch.cat([-above, below], dim=1)
+        return [np.concatenate([*one], axis=1) for one in np.split(every.numpy()[:, np.argsort(order)], len(parts), 2)]
 
     def corrector(self, best: Sequence[Row]) -> KernelCompensator:
         """Return the mean of the solutions, and keep what those of the trials miss without each fold."""
-        varying, centres, members = self.varying, self.values[self.part].cpu().numpy(), []
+        varying, centres, members = self.varying, self.values[self.part], []
         tried = [(row["params"], self.folds_left_out(row["number"])) for row in best if row["number"] < self.parts]
         if self.few:
             tried.append((self.descend(next(iter(self.method.points())))[1], []))
@@ -145,11 +144,10 @@ class KernelProblem(PathProblem):
         for settings, folds in tried:
             scales = np.array([settings[name] for name in self.scales])
             weights, *others = self.solve(settings, folds)
-            members.append(KernelMember(scales, settings["linear"], weights.cpu().numpy()))
-            sides, around = (each / self._tensor(scales) for each in (self.sides, self.values[self.part]))
+            members.append(KernelMember(scales, settings["linear"], weights))
+            sides, around = (each / scales for each in (self.sides, centres))
             for (_, judged), own in zip(folds, others, strict=True):
-                paths = weighed_kernels(sides[:, judged], around, settings["linear"], own, torch)
-                outputs = unflatten_paths(paths.cpu().numpy())
+                outputs = unflatten_paths(weighed_kernels(sides[:, judged], around, settings["linear"], own))
                 errors[:, judged] = self.targets[:, judged] - np.tensordot(self.basis, outputs, 1)
         self.left_out = errors if self.parts > 1 else None
         made: KernelCompensator = self.method.corrector(
@@ -158,45 +156,54 @@ class KernelProblem(PathProblem):
         return made
 
 
-def mirror_sums(sides: Tensor) -> Tensor:
+def mirror_sums(sides: Array) -> Array:
     """Sum and difference (2, S, C) of kernels with windows as they are and with mirrored ones, in their place.
 
     These make x and y. Without a mirror there is one (1, S, C), which stays.
     """
     if len(sides) == 2:
         sides[0] += sides[1]
-        torch.sub(sides[0], sides[1], alpha=2, out=sides[1])
+        sides[1] *= -2
+        sides[1] += sides[0]
     return sides
+
+
+def windows_within(sets: Sequence[Index], windows: Index) -> NDArray[np.bool_]:
+    """Whether windows (S,) are in each of some sets, (F, S)."""
+    table = np.zeros((len(sets), 1 + max(windows.max(), *(each.max() for each in sets))), bool)
+    for row, each in zip(table, sets, strict=True):
+        row[each] = True
+    return table[:, windows]
 
 
 class FoldBlocks:
     """What folds leave out of some windows.
 
-    out : places of the windows (F, b), filled up with 0. known : which of them are there; judged : which are judged.
+    out : places of the windows (F, b), filled up with others. known : those left out; judged : those that are judged.
     """
 
-    def __init__(self, folds: Sequence[tuple[Index, Index]], rows: Index, device: str) -> None:
-        outs = [np.flatnonzero(~np.isin(rows, training)) for training, _ in folds]
-        width = max(map(len, outs))
-        filled = np.stack([np.pad(out, (0, width - len(out))) for out in outs])
-        known = np.arange(width) < np.array([[len(out)] for out in outs])
-        judged = known & np.stack([np.isin(rows[out], fold[1]) for out, fold in zip(filled, folds, strict=True)])
-        self.count = int(judged.sum())
-        self.out, self.known, self.judged = (torch.as_tensor(each, device=device) for each in (filled, known, judged))
+    def __init__(self, folds: Sequence[tuple[Index, Index]], rows: Index) -> None:
+        out, judges = (
+            ~windows_within([fold[0] for fold in folds], rows),
+            windows_within([fold[1] for fold in folds], rows),
+        )
+        places = np.argsort(~out, axis=1, kind="stable")[:, : out.sum(axis=1).max()]
+        known = np.take_along_axis(out, places, axis=1)
+        judged = known & np.take_along_axis(judges, places, axis=1)
+        self.out, self.known, self.judged, self.count = places, known, judged, int(judged.sum())
 
-    def errors_and_slope(self, kernel: Tensor, outputs: Tensor) -> tuple[Tensor, Tensor]:
+    def errors_and_slope(self, kernel: Array, outputs: Array) -> tuple[Array, Array]:
         """What fits without each block miss of it (K, F, b, R), 0 where it is not judged; slope of its square.
 
         kernel : (K, S, S) with the ridge. outputs : (K, S, R).
         """
-        inverse = torch.cholesky_inverse(torch.linalg.cholesky(kernel))
+        inverse = torch.cholesky_inverse(torch.linalg.cholesky(torch.from_numpy(kernel))).mT.numpy()  # symmetric
         weights, columns = inverse @ outputs, inverse[:, self.out]  # (K, F, b, S)
         both = self.known[:, :, None] & self.known[:, None, :]
-        eye = torch.eye(both.shape[1], dtype=kernel.dtype, device=kernel.device)
-        blocks = torch.where(both, inverse[:, self.out[:, :, None], self.out[:, None]], eye)
-        factors = torch.linalg.cholesky(blocks)
-        every = torch.cholesky_solve(self.known[..., None] * weights[:, self.out], factors)
+        blocks = np.where(both, inverse[:, self.out[:, :, None], self.out[:, None]], np.eye(both.shape[1]))
+        every = np.linalg.solve(blocks, self.known[..., None] * weights[:, self.out])
         missed = self.judged[..., None] * every
-        within = torch.cholesky_solve(missed, factors)
-        inner = (within @ every.mT) @ columns - within @ weights.mT[:, None]
-        return missed, 2 * columns.flatten(1, 2).mT @ inner.flatten(1, 2)
+        within = np.linalg.solve(blocks, missed)
+        inner = (within @ every.mT) @ columns
+        left, inner, within = (each.reshape(len(each), -1, each.shape[-1]) for each in (columns, inner, within))
+        return missed, 2 * (left.mT @ inner - (left.mT @ within) @ weights.mT)

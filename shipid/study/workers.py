@@ -25,6 +25,8 @@ PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.kernel
 """Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
 NO_GUARD = 64  # exit status of a worker whose script starts workers: EX_USAGE of sysexits.h
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
+KEPT_MEMORY = f"glibc.malloc.mmap_threshold={32 * 2**20}:glibc.malloc.trim_threshold={sys.maxsize}"
+"""Lets glibc keep memory that was freed, of arrays as large as it can (mallopt(3)): to get it again takes time."""
 _WORK: list[Any] = []  # of a worker: what it does with its tasks, as bytes until the first one; see `_begin`
 
 Task = TypeVar("Task")
@@ -141,9 +143,9 @@ def _answer(task: Any) -> bytes:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Processes started meanwhile use one thread, whatever they import."""
+    """Processes started meanwhile use one thread, whatever they import, and keep memory that they have freed."""
     before = dict(os.environ)
-    os.environ.update(ONE_THREAD)
+    os.environ.update({"GLIBC_TUNABLES": KEPT_MEMORY} | ONE_THREAD)
     try:
         yield
     finally:

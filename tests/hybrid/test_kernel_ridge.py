@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from scipy.optimize import check_grad, minimize
 
 from shipid.hybrid import kernel_ridge
@@ -36,8 +35,8 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(kind: str) -> None
         folds = [(np.arange(30, 120), np.arange(30))]
     features = rng.normal(size=(len(ALL), 200))
     kernel, outputs = features @ features.T / 200 + 0.3 * np.eye(len(ALL)), rng.normal(size=(len(ALL), 3))
-    made, _ = FoldBlocks(folds, ALL, "cpu").errors_and_slope(torch.tensor(kernel)[None], torch.tensor(outputs)[None])
-    for (training, judged), errors in zip(folds, made[0].numpy(), strict=True):
+    made, _ = FoldBlocks(folds, ALL).errors_and_slope(kernel[None], outputs[None])
+    for (training, judged), errors in zip(folds, made[0], strict=True):
         weights = np.linalg.solve(kernel[np.ix_(training, training)], outputs[training])
         expected = outputs[judged] - kernel[np.ix_(judged, training)] @ weights
         np.testing.assert_allclose(errors[np.abs(errors).sum(axis=1) > 0], expected, atol=1e-10)
@@ -47,15 +46,15 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(kind: str) -> None
 def test_a_descent_goes_by_the_kernel_of_the_solution_and_by_its_slope(mirror: bool, monkeypatch: Any) -> None:
     """Its value is the error of fits with that kernel; its slope by hand is the difference."""
     method = SMALL.model_copy(update={"mirror": mirror})
-    problem, blocks = KernelProblem(method, given(), "one"), FoldBlocks(FOLDS, ALL, "cpu")
+    problem, blocks = KernelProblem(method, given(), "one"), FoldBlocks(FOLDS, ALL)
     assert len(problem.sides) == 1 + mirror
 
     def check(function: Any, start: np.ndarray, **how: Any) -> Any:
         away = start + np.linspace(-0.3, 0.4, len(start))
         assert check_grad(lambda x: function(x)[0], lambda x: function(x)[1], away) < 1e-5
-        kernel = problem.kernels(ALL, ALL, point) + point["ridge"] * torch.eye(len(ALL), dtype=torch.float64)
+        kernel = problem.kernels(ALL, ALL, point) + point["ridge"] * np.eye(len(ALL))
         missed, _ = blocks.errors_and_slope(kernel, problem.outputs[:, ALL])
-        assert function(start)[0] == pytest.approx(float((missed**2).sum().log()), rel=1e-10)
+        assert function(start)[0] == pytest.approx(np.log((missed**2).sum()), rel=1e-10)
         return minimize(function, start, **how)
 
     monkeypatch.setattr(kernel_ridge, "minimize", check)
@@ -80,8 +79,8 @@ def test_errors_of_runs_left_out_are_those_of_refits(centres: int) -> None:
                 problem.outputs[:, rest],
                 strict=True,
             ):
-                gram = kernel.numpy() + row["params"]["ridge"] * np.eye(len(rest))
-                made.append(around.numpy() @ np.linalg.solve(gram, outputs.numpy()))
+                gram = kernel + row["params"]["ridge"] * np.eye(len(rest))
+                made.append(around @ np.linalg.solve(gram, outputs))
             paths = np.einsum("tk,cnk->tnc", problem.basis, np.stack(made))
             np.testing.assert_allclose(fit.left_out[:, judged], problem.targets[:, judged] - paths, atol=1e-8)
 

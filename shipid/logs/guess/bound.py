@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.commands import PULSES
@@ -56,6 +55,8 @@ def _columns_of_commands(
     """The column of each command: the cheapest assignment by name, side and number; one column may serve several."""
     if not drafted:
         return {}
+    from scipy.optimize import linear_sum_assignment  # most drafts are for no vessel, and it takes its time
+
     against = np.array([[_cost_of_column(state, name, one, names, idle, vessel) for one in drafted] for name in names])
     rows, columns = linear_sum_assignment(against)
     found = {names[row]: drafted[col] for row, col in zip(rows, columns, strict=True) if against[row, col] < OTHER_SIDE}

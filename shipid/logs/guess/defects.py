@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -9,13 +11,15 @@ from numpy.typing import NDArray
 from shipid import document
 from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError
-from shipid.identification.diagnosis import NONE, Diagnosis, diagnose
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.lapses import break_repair, places_in_words
 from shipid.logs.guess.sniff import LogTable
 from shipid.logs.mapping import source_columns, to_si
+
+if TYPE_CHECKING:
+    from shipid.identification.diagnosis import Diagnosis
 
 OFFSET = 0.02  # rad: less is no finding
 CAUSES = {
@@ -60,7 +64,7 @@ def defects_of_motion(state: State) -> None:
     if state.body is not None:
         found = _diagnose_motion(state)
         _ask_if_course(state, state.body)
-    while found is not None and found.cause != NONE:
+    while found is not None and found.cause != "none":
         repair = document.parse_toml(found.repair).get("repair", [None])[0] if found.repair.startswith("[[") else None
         if repair is not None and repair.get("seconds", 0.0) < 0.0:  # the other one is late
             repair |= {"signal": OTHER[repair["signal"]], "seconds": -repair["seconds"]}
@@ -101,6 +105,8 @@ def _ask_about_north(state: State, angle: float, error: float) -> None:
 
 def _diagnose_motion(state: State) -> Diagnosis | None:
     """What is wrong with the motion of a log, by kinematics alone; None where its stretches are too short."""
+    from shipid.identification.diagnosis import diagnose  # few logs have what it needs, and it takes its time
+
     assert state.body is not None
     rate = np.gradient(state.psi, state.t) if state.r is None else state.r
     place, speed = state.position, state.body
