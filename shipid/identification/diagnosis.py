@@ -233,9 +233,9 @@ class _Log:
         parts, places = list[dict[str, Array]](), list[int]()
         for run, rows in stretches:
             t = np.asarray(rows["t"], dtype=float)
-            count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
+            count = int((t[-1] - t[0]) / self.step + 1e-6)
             if count > SHORTEST and len(t) > 8:
-                grid = t[0] + self.step * np.arange(count)
+                grid = t[0] + self.step * (np.arange(count) + 0.5)  # a mean over half a step is of another time
                 names = [name for name in rows if name not in ("run", "t", "flags")]
                 parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
                 places.append(list(runs).index(run))
@@ -553,8 +553,8 @@ def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
     if np.median(np.diff(t)) > 0.7 * step:
         return np.asarray(CubicSpline(t, values)(grid))
     total = cumulative_integral(t, values)
-    low, high = (np.clip(grid + side * step / 2, t[0], t[-1]) for side in (-1, 1))
-    return np.asarray((np.interp(high, t, total) - np.interp(low, t, total)) / (high - low))
+    low, high = (np.interp(grid + side * step / 2, t, total) for side in (-1, 1))
+    return np.asarray((high - low) / step)
 
 
 @lru_cache(maxsize=16)
