@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -20,10 +21,9 @@ from shipid.data.dataset import (
     travelled_position,
     unit_of_column,
 )
+from shipid.data.lapses import Plane, stuck_spans
 from shipid.errors import DataError
 from shipid.physics.signals import signal_row
-
-Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
 GAP_STEPS = 3.0  # usual steps: a longer one is a time without rows
 JITTER_LIMIT, FROZEN_LIMIT, OVERLAP_LIMIT = 0.05, 0.02, 0.5
@@ -169,11 +169,23 @@ def _motion(stretches: list[pd.DataFrame]) -> _Motion:
 
 
 def _check_frozen(stretches: list[pd.DataFrame]) -> dict[str, Any]:
-    """Share of the rows whose motion is that of the row before."""
-    states = ["north", "east", "psi", "u", "v", "r"]
-    same = np.concatenate([(rows[states].diff().iloc[1:] == 0).all(axis=1).to_numpy() for rows in stretches])
-    frozen = float(same.mean()) if len(same) else 0.0
-    return _check_row("frozen", frozen, "1", FROZEN_LIMIT, f"{100 * frozen:.3g} % of the rows repeat the row before")
+    """Largest share of the rows that repeat the row before: all of its motion, or one signal that others contradict."""
+    states, counts = ["north", "east", "psi", "u", "v", "r"], Counter[str]({"motion": 0})
+    for rows in stretches:
+        t, north, east, psi, u, v, r = (rows[name].to_numpy() for name in ("t", *states))
+        velocity, psi = (u + 1j * v) * np.exp(1j * psi), np.unwrap(psi)
+        course = np.where(velocity == 0.0, psi, np.angle(velocity)).round(9)
+        seen = {"psi": psi, "r": r, "course": course, "speed": np.abs(velocity).round(9)}
+        counts["motion"] += int((rows[states].diff().iloc[1:] == 0).all(axis=1).sum())
+        for name, values in seen.items():
+            pose, rates = (psi, north + 1j * east), (r, velocity)
+            spans = stuck_spans(name, t, values, pose, rates, np.ones(len(t) - 1, dtype=bool))
+            counts[name] += sum(last - first for first, last in spans)
+    ((name, count),) = counts.most_common(1)
+    frozen = count / max(sum(len(rows) - 1 for rows in stretches), 1)
+    words = "" if name == "motion" else ", which the other signals contradict"
+    sentence = f"{100 * frozen:.3g} % of the rows repeat the {name} of the row before{words}"
+    return _check_row("frozen", frozen, "1", FROZEN_LIMIT, sentence)
 
 
 def _check_overlap(run: str, motions: Mapping[str, _Motion], shared: bool) -> dict[str, Any]:

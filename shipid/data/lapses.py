@@ -1,4 +1,4 @@
-"""Lapses of commands: rows in which a rudder or a shaft is 0, far off or still, and none can have been so."""
+"""Lapses: rows in which a rudder or a shaft is 0, far off or still, or a sensor is stuck, and none can have been so."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Array
+from shipid.data.dataset import Array, cumulative_integral
 from shipid.physics.signals import drive_scale, is_all_round, is_steering
 
 RowMask = NDArray[np.bool_]
+Plane = NDArray[np.complex128]
 
 LONGEST_USABLE_STEP = 2.0  # s: in longer steps a rudder goes anywhere and back
 LONGEST_ZERO, LONGEST_PAUSE = 20.0, 5.0  # s: of a zero, and of one in an order
@@ -43,6 +44,9 @@ TURN_TO_BOTH_SIDES = np.radians(
     20.0
 )  # by which the ship turns meanwhile, to each side: to one it turns by a held helm, too
 TURN_OF_ROWS = np.radians(5.0)  # by which it turns in `STILL_ROWS` rows of another turn
+STUCK_SECONDS, STUCK_REPEATS = 4.5, 4.0  # s; times the usual repetition, at least
+MISSED_TURN, MISSED_WAY = np.radians(6.0), 0.02  # rad; share of the way: IMO MSC.96(72) allows a log 2 %
+MISSED_STEPS = 2.0  # large steps of a position
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,33 @@ def find_command_faults(name: str, t: Array, values: Array, psi: Array, follows:
         return []
     found = [*_zeros_and_spikes(name, t, values, follows), *_find_still_values(name, values, psi, follows)]
     return sorted(found, key=lambda one: one.first)
+
+
+def stuck_spans(
+    name: str, t: Array, values: Array, pose: tuple[Array, Plane], rates: tuple[Array, Plane], follows: RowMask
+) -> list[tuple[int, int]]:
+    """First and last row of each stretch in which a sensor repeats one value and the others say that it cannot.
+
+    name : psi, r, course or speed, of which values (N,) are readings at t [s]. pose : psi [rad] without jumps, and
+    position, north + i east [m]. rates : r [rad/s], and velocity over ground [m/s]. follows : as in
+    `find_command_faults`.
+    """
+    edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ~follows, [True]]))
+    lengths = np.diff(edges)
+    long = lengths >= STUCK_REPEATS * np.median(np.repeat(lengths, lengths))
+    first, last = edges[:-1][long], edges[1:][long] - 1
+    turned = cumulative_integral(t, rates[0])
+    missed, least = {"psi": turned, "r": pose[0] - turned}.get(name, pose[0]), np.array(MISSED_TURN)
+    if name == "speed":
+        speed, steps = np.abs(rates[1]), np.diff(pose[1])
+        ahead = steps * np.exp(-1j * np.angle(rates[1][1:]))  # noise of a position makes no way
+        missed = np.append(0.0, np.cumsum(ahead.real)) - cumulative_integral(t, speed)
+        digit = np.median(np.abs(np.diff(speed))[np.diff(values) != 0]) if len(lengths) > 1 else 0.0
+        least = (MISSED_WAY * speed[first] + digit) * (t[last] - t[first])
+        least += MISSED_STEPS * np.percentile(np.abs(steps), 95)
+    off = np.array([np.ptp(missed[a : b + 1]) for a, b in zip(first, last, strict=True)])
+    stuck = (t[last] - t[first] >= STUCK_SECONDS) & (off > least)
+    return list(zip(first[stuck].tolist(), last[stuck].tolist(), strict=True))
 
 
 def _zeros_and_spikes(name: str, t: Array, values: Array, follows: RowMask) -> Iterator[CommandFault]:

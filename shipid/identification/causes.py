@@ -25,6 +25,7 @@ UNITS = tuple(sign * float(np.log(unit)) for unit in (1852 / 3600, np.pi / 180, 
 """Logarithms of the factors of a wrong unit: knots, degrees, minutes."""
 SPEEDS, COURSES = "runs at several speeds", "runs on opposite courses"
 BESIDE = "the command read beside its instrument"
+SEVERAL, ASYMMETRY = "several coefficients", "asymmetry of hull or screw"
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,11 @@ class Cause:
     def name(self) -> str:
         """The key without the words that tell variants of a cause apart."""
         return self.key.partition(" / ")[0]
+
+    @property
+    def is_of_forces(self) -> bool:
+        """Whether coefficients of the vessel make up for it."""
+        return any(key.startswith("coefficient") for key in (self.name, *self.equals))
 
     def is_like(self, other: Cause) -> bool:
         """Whether both are of one class."""
@@ -232,8 +238,9 @@ def _add_drift(motion: Motion, size: Array, *, along: bool = False) -> Motion:
     return _add_current(np.zeros(len(body), dtype=np.intp), motion.put({"u": over.real, "v": over.imag}), size)
 
 
-def _scale_numbers(where: NDArray[np.bool_], motion: Motion, size: Array) -> Motion:
-    return replace(motion, parameters=np.where(where, motion.parameters * np.exp(size[0]), motion.parameters))
+def _scale_numbers(groups: NDArray[np.bool_], motion: Motion, size: Array) -> Motion:
+    """The log with the numbers of each group (k, P) of a vessel times a factor of their own."""
+    return replace(motion, parameters=motion.parameters * np.exp(size @ groups))
 
 
 def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]:
@@ -242,7 +249,7 @@ def _command_causes(name: str, values: Array, scales: Scales) -> Iterator[Cause]
     strength = ("coefficient rudder",) if angle else (f"{key} zero", "coefficient thrust", "coefficient damping")
     yield Cause(
         f"{key} zero", partial(_subtract, name), (0.05 * size,), unit, 0.003 if angle else 0.01 * size,
-        equals=("asymmetry of hull or screw",) if angle else (f"{key} scale", *strength[1:]),
+        equals=(ASYMMETRY,) if angle else (f"{key} scale", *strength[1:]),
         tells="the angle read on a slip, and a run at another speed" if angle else SPEEDS,
     )  # fmt: skip
     yield Cause(
@@ -294,7 +301,7 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
     yield Cause(
         "sensor psi bias / with velocities", rotate_heading, (0.02,), "rad", 0.015,
         repair='[[repair]]\nkind = "heading_offset"\noffset = {minus0}',
-        equals=("asymmetry of hull or screw", "sensor v bias", "current"), tells=COURSES,
+        equals=(ASYMMETRY, "sensor v bias", "current"), tells=COURSES,
     )  # fmt: skip
     scaled: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
         "u": (("u",), (0, 4)), "v": (("v",), (1,)), "r": (("r",), (2, 3)), "velocity": (VELOCITY, (0, 1, 4, 5))
@@ -388,13 +395,21 @@ def _coefficient_causes(vessel: Vessel) -> Iterator[Cause]:
         "thrust": ([*filter(is_thrust, names)], ("coefficient damping", "coefficient mass", shaft)),
         "rudder": ([*filter(_is_rudder_force, names)], ("command scale of an angle",)),
     }
-    for group, (paths, equals) in groups.items():
-        if paths:
-            yield Cause(
-                f"coefficient {group}", partial(_scale_numbers, np.isin(names, paths)), (0.05,), "1", 0.03, ratio=True,
-                repair=f"--parameters {','.join(paths)}  # factor {{0}}", equals=equals,
-                tells=BESIDE if group == "rudder" else "runs that speed up and slow down",
-            )  # fmt: skip
+    there = {group: np.isin(names, paths) for group, (paths, _) in groups.items() if paths}
+    for group, where in there.items():
+        paths, equals = groups[group]
+        yield Cause(
+            f"coefficient {group}", partial(_scale_numbers, where[None]), (0.05,), "1", 0.03, ratio=True,
+            repair=f"--parameters {','.join(paths)}  # factor {{0}}", equals=equals,
+            tells=BESIDE if group == "rudder" else "runs that speed up and slow down",
+        )  # fmt: skip
+    if len(there) > 1:
+        factors = ", ".join(f"{group} x {{{i}}}" for i, group in enumerate(there))
+        yield Cause(
+            SEVERAL, partial(_scale_numbers, np.array([*there.values()])), len(there) * (0.05,), "1", 0.03, ratio=True,
+            repair=f"shipid identify, as the forces are a guess: {factors}", equals=("scales of commands",),
+            tells=BESIDE,
+        )  # fmt: skip
 
 
 def _is_rudder_force(path: str) -> bool:

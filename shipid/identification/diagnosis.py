@@ -77,7 +77,16 @@ from shipid.engine.casadi import input_symbols, memory_along, summed_rates
 from shipid.engine.rollout import rollout_distances
 from shipid.engine.samples import map_over_samples
 from shipid.errors import DataError
-from shipid.identification.causes import Cause, Motion, Scales, list_causes, multiply_signs, rotate_heading
+from shipid.identification.causes import (
+    ASYMMETRY,
+    SEVERAL,
+    Cause,
+    Motion,
+    Scales,
+    list_causes,
+    multiply_signs,
+    rotate_heading,
+)
 from shipid.physics.signals import is_command, is_shaft, is_steering, is_wrapped_angle
 from shipid.simulation.log import body_velocities, state_column
 from shipid.units import percent_text
@@ -87,7 +96,7 @@ from shipid.vessel.load import Vessel
 Steps = NDArray[np.integer[Any]]
 SetNumbers = Callable[[Array], Mapping[str, float]]
 """Factors (n,) -> path -> parameter of the vessel [SI]."""
-NONE, UNCLEAR = "none", "cannot tell"
+NONE, UNCLEAR, UNEXPLAINED = "none", "cannot tell", "unexplained"
 LENGTHS, POINTS, STRIDE = 2.0, 32, 16  # ship lengths of way in a bump; its steps; steps from bump to bump
 CHANGES = 0.5  # share of the rows with a change: from there on a command is measured, below it is an order
 EVERY, BETWEEN = 2, 0.7  # steps from one evaluation of the physics to the next; over which an order is a mean
@@ -112,6 +121,7 @@ BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from
 UNRIVALLED = 7.0  # times the gain of any cause of another class: so much no defect of the physics gives
 DECISIVE, ALIKE = 2.0, 0.3  # gain for each bump that needs no standard error; share of a gain that a runner-up may lack
 WORTH, DISCRETE = 0.2, 0.25  # share of the error of the paths; of both thresholds, for a cause without a size
+POOR = 0.5  # of the error of held u, v, r: of 12 drawn ships 1 truth errs more, and 10 first guesses
 STATES = ("u", "v", "r", "psi", "north", "east")
 
 
@@ -119,12 +129,12 @@ STATES = ("u", "v", "r", "psi", "north", "east")
 class Diagnosis:
     """What is wrong with a vessel and its log.
 
-    cause : key, `none` or `cannot tell`. equals : keys that the log does not tell from it.
+    cause : key, `none`, `unexplained` or `cannot tell`. equals : keys that the log does not tell from it.
     size : of the cause in SI units, an empty tuple where it has none (a sign). interval : 95 %, (low, high) of each.
     repair : lines for the mapping of the log, the vessel or the settings of an identification.
     sentence : all of it in words. share : of the mean error [m] of predicted paths over `ahead` [s], less that of the
         noise, that it explains.
-    noise : mean error [m] of these paths by the noise of the log alone.
+    noise, held : mean error [m] of these paths by the noise of the log alone, and with u, v, r as they begin.
     next : the same of a second cause beside the first, if there is one; sizes are those beside each other.
     misfits : key -> misfit on parts left out, less that of `none`.
     """
@@ -138,6 +148,7 @@ class Diagnosis:
     share: float = 0.0
     error: float = 0.0
     noise: float = 0.0
+    held: float = 0.0
     ahead: float = 0.0
     next: Diagnosis | None = None
     misfits: Mapping[str, float] | None = None
@@ -145,7 +156,8 @@ class Diagnosis:
     @property
     def how_far(self) -> str:
         """The error of the paths in words."""
-        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average (noise alone: {self.noise:.2g} m)"
+        others = f"noise alone: {self.noise:.2g} m, constant u, v, r: {self.held:.2g} m"
+        return f"paths over {self.ahead:.3g} s err by {self.error:.3g} m on average ({others})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +211,7 @@ class _Log:
         self.plain_errors = self.path_errors(self.motion)
         more = self.path_errors(self.motion.put(noisy)).mean() ** 2 - self.plain_errors.mean() ** 2
         self.blind = float(np.hypot(max(more, 0.0) ** 0.5, self.blur))
+        self.held = float(self.path_errors(self.motion, held=True).mean())
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log."""
@@ -217,10 +230,10 @@ class _Log:
         """Mean accelerations (3, W) over the bumps, such as they are: no physics says others."""
         return np.array([motion.columns[name][self.bumps] @ self.pull for name in ("u", "v", "r")])
 
-    def path_errors(self, motion: Motion) -> Array:
-        """Mean error (K,) [m] of each path over 2.5 ship lengths by dead reckoning with u, v, r."""
+    def path_errors(self, motion: Motion, held: bool = False) -> Array:
+        """Mean error (K,) [m] of each path by dead reckoning with u, v, r, or with those of its begin, `held`."""
         columns, rows = self.states(motion), self.paths + np.arange(self.ahead + 1)[:, None]
-        u, v, r = (columns[name][rows] for name in ("u", "v", "r"))
+        u, v, r = (columns[name][rows[:1] + 0 * rows if held else rows] for name in ("u", "v", "r"))
 
         def travelled(rate: NDArray[Any]) -> NDArray[Any]:
             return self.step * np.cumsum((rate[1:] + rate[:-1]) / 2, axis=0)
@@ -233,9 +246,9 @@ class _Log:
         parts, places = list[dict[str, Array]](), list[int]()
         for run, rows in stretches:
             t = np.asarray(rows["t"], dtype=float)
-            count = int((t[-1] - t[0]) / self.step + 1e-6) + 1
+            count = int((t[-1] - t[0]) / self.step + 1e-6)
             if count > SHORTEST and len(t) > 8:
-                grid = t[0] + self.step * np.arange(count)
+                grid = t[0] + self.step * (np.arange(count) + 0.5)  # a mean over half a step is of another time
                 names = [name for name in rows if name not in ("run", "t", "flags")]
                 parts.append({name: _at_steps(name, t, np.asarray(rows[name], dtype=float), grid) for name in names})
                 places.append(list(runs).index(run))
@@ -518,8 +531,10 @@ class _VesselLog(_Log):
         names = [state_column(name) for name in (*self.model.state, *self.model.hidden)]
         return np.array([columns[name][at] if name in columns else np.zeros(len(at)) for name in names])
 
-    def path_errors(self, motion: Motion) -> Array:
-        """Mean error (K,) [m] of each path that the physics predicts over 2.5 ship lengths."""
+    def path_errors(self, motion: Motion, held: bool = False) -> Array:
+        """Mean error (K,) [m] of each path that the physics predicts."""
+        if held:
+            return super().path_errors(motion, held)
         motion = self._with_drift(motion)
         columns, at = self.states(motion), self.paths
         rows = at + np.arange(self.ahead + 1)[:, None]
@@ -553,8 +568,8 @@ def _at_steps(name: str, t: Array, values: Array, grid: Array) -> Array:
     if np.median(np.diff(t)) > 0.7 * step:
         return np.asarray(CubicSpline(t, values)(grid))
     total = cumulative_integral(t, values)
-    low, high = (np.clip(grid + side * step / 2, t[0], t[-1]) for side in (-1, 1))
-    return np.asarray((np.interp(high, t, total) - np.interp(low, t, total)) / (high - low))
+    low, high = (np.interp(grid + side * step / 2, t, total) for side in (-1, 1))
+    return np.asarray((high - low) / step)
 
 
 @lru_cache(maxsize=16)
@@ -647,21 +662,50 @@ def diagnose(
     motion = log.motion
     first, fit = _judge(log, causes)
     if fit is None:
-        return first
-    log.repair(fit.motion)
+        return replace(first, sentence=first.sentence + _zeros_beside(log, causes, first))
+    _repair(log, fit, fit.motion)
     second, other = _judge(log, [one for one in causes if one.name != fit.cause.name])
+    if other is not None and fit.cause.is_of_forces and other.cause.is_of_forces:  # two of them: all are a guess
+        log.repair(motion)
+        joint, every = _judge_physics(log, causes, (log.plain_residuals, log.path_errors(motion)), first, None)
+        if every is not None:
+            _repair(log, every, every.motion)
+            first, fit, second, other = joint, every, _judge(log, causes)[0], None
     rivals = [name for name in first.equals if first.cause == UNCLEAR and name != fit.cause.name]
     if rivals and all(_gain_of(second, name) > BOTH * _gain_of(first, name) for name in rivals):  # both are there
         first = _describe(replace(first, cause=fit.cause.name, equals=()), fit)
-    if other is not None and second.cause != NONE:  # what was best alone may not be so beside the other
-        log.repair(other.cause.change(motion, other.theta))
+    if other is not None and second.cause not in (NONE, UNEXPLAINED):  # the best alone may not be so beside the other
+        _repair(log, other, other.cause.change(motion, other.theta))
         first, fit = _judge(log, [one for one in causes if one.name != other.cause.name])
         log.repair(motion if fit is None else fit.cause.change(motion, fit.theta))
         second = second if second.cause == UNCLEAR else _describe(second, log.estimate(other.cause))
-        if first.cause in (NONE, UNCLEAR):
+        if first.cause in (NONE, UNCLEAR, UNEXPLAINED):
             first, second = second, first
-    both = replace(first, sentence=f"{first.sentence}; without that, {second.sentence}", next=second)
-    return first if first.cause == NONE else both
+    words = f"{first.sentence}; without that, {second.sentence}" if first.cause not in (NONE, UNEXPLAINED) else ""
+    both = replace(first, sentence=words + _zeros_beside(log, causes, first, second), next=second)
+    return both if words else first
+
+
+def _zeros_beside(log: _Log, causes: Sequence[Cause], *found: Diagnosis) -> str:
+    """Zeros of angles that show beside wrong forces, in words: mirror images tell them, however far paths err."""
+    names, words = {result.cause for result in found}, ""
+    if UNEXPLAINED not in names and not any(one.is_of_forces for one in causes if one.name in names):
+        return words
+    given = log.plain_residuals, log.path_errors(log.motion)
+    for fit in (log.estimate(one) for one in causes if one.equals == (ASYMMETRY,) and one.name not in names):
+        gain, error = log.gain(given, (fit.left_out, log.path_errors(fit.motion)))
+        theta, width = fit.theta[0], 1.96 * fit.errors[0]
+        if fit.counts and gain > error and abs(theta) > width:
+            size = f"{theta:.3g} [{theta - width:.3g}, {theta + width:.3g}] {fit.cause.unit}"
+            words += f"; beside wrong forces {fit.cause.name} = {size} or {ASYMMETRY} shows, too"
+    return words
+
+
+def _repair(log: _Log, fit: _Fit, motion: Motion) -> None:
+    """Take a motion without a cause for the log; beside coefficients that are a guess, the rest is what there is."""
+    log.repair(motion)
+    if fit.cause.name == SEVERAL:
+        log.plain_errors = log.path_errors(motion)
 
 
 def _gain_of(result: Diagnosis, name: str) -> float:
@@ -671,7 +715,7 @@ def _gain_of(result: Diagnosis, name: str) -> float:
 def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     """The best of all causes as a diagnosis, and its fit where it explains more than chance would."""
     given = log.plain_residuals, log.path_errors(log.motion)
-    first = {cause.key: log.estimate(cause, 1) for cause in causes}
+    first = {cause.key: log.estimate(cause, 1) for cause in causes if cause.name != SEVERAL}
     near = sorted(first, key=lambda key: log.misfit(first[key].left_out))[: 2 * FINALISTS]
     fits = first | {key: log.estimate(first[key].cause, ROUNDS - 1, first[key].theta) for key in near}
     rest = min(log.misfit(z) for z in (given[0], *(fit.left_out for fit in fits.values() if not fit.cause.of_runs)))
@@ -692,19 +736,21 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     ease = {key: 1.0 if fits[key].cause.trial else DISCRETE for key in order}
     worth = {key: (min(before, whole) - x) / whole / ease[key] * fits[key].counts for key, x in left.items()}
     decisive = DECISIVE * log.worth * ease[order[0]]
-    result = Diagnosis(NONE, error=missed, noise=log.blind, ahead=log.step * log.ahead, misfits=misfits)
+    result = Diagnosis(NONE, error=missed, noise=log.blind, held=log.held, ahead=log.step * log.ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
     rival = max((-misfits[key] for key in fits if not fits[key].cause.is_like(fits[order[0]].cause)), default=np.inf)
     by_chance = gain < min(-ndtri(LEVEL / len(causes)) * error, decisive, UNRIVALLED * max(rival, 1.0))
     plain = {key: log.plainness(fits[key]) for key in order}
-    if missed < log.blur or (by_chance and plain[order[0]] <= PLAIN):
+    if missed < log.blur:
         return result, None
+    if by_chance and plain[order[0]] <= PLAIN:
+        return _judge_physics(log, causes, given, result, None)
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
     told = sorted((one for one in tied if plain[one.key] > PLAIN), key=lambda one: (one.cost, -plain[one.key]))
     told = told or [one for one in tied if worth[one.key] > WORTH]
     if not told:
-        return result, fits[order[0]] if gain > decisive else None
+        return _judge_physics(log, causes, given, result, fits[order[0]] if gain > decisive else None)
     cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
     result = replace(result, share=1 - left[cause.key] / before, equals=tuple(near))
     if not all(map(cause.is_like, told)):
@@ -714,13 +760,30 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     return _describe(replace(result, cause=cause.name, equals=equals), best), best
 
 
+def _judge_physics(
+    log: _Log, causes: Sequence[Cause], given: tuple[Array, Array], result: Diagnosis, best: _Fit | None
+) -> tuple[Diagnosis, _Fit | None]:
+    """What is said where no single cause is named: all coefficients are a guess, or the physics says little."""
+    whole, before = log.beyond_noise(log.plain_errors), log.beyond_noise(given[1])
+    for fit in (log.estimate(one) for one in causes if one.name == SEVERAL):
+        errors = log.path_errors(fit.motion)
+        (gain, error), left = log.gain(given, (fit.left_out, errors)), log.beyond_noise(errors)
+        if gain > -ndtri(LEVEL / len(causes)) * error and before - left > WORTH * whole:
+            return _describe(replace(result, cause=SEVERAL, share=1 - left / before), fit), fit
+    if before > POOR * log.held:
+        words = "that is hardly better than constant u, v, r: look at units, orders and water, or identify the vessel"
+        result = replace(result, cause=UNEXPLAINED, sentence=f"{result.sentence}; {words}")
+    return result, best
+
+
 def _describe(result: Diagnosis, fit: _Fit) -> Diagnosis:
     """A diagnosis with the size, the interval, the repair and the sentence of the fit of its cause."""
     cause, theta, equals = fit.cause, fit.theta, result.equals
     ends = (cause.sizes(theta - 1.96 * fit.errors), cause.sizes(theta + 1.96 * fit.errors))
     interval = tuple((min(pair), max(pair)) for pair in zip(*ends, strict=True))
     sizes, repair = cause.sizes(theta), cause.repair_text(theta)
-    words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes[:MOST_SIZES], interval, strict=False)]
+    words = [f"{size:.3g} [{a:.3g}, {b:.3g}]" for size, (a, b) in zip(sizes, interval, strict=True)]
+    words = words if len(words) <= MOST_SIZES else []
     sized, unit = f"{' = ' * bool(words)}{', '.join(words)}", cause.unit.strip("1")
     worth = f"explains {percent_text(result.share)} of what is no noise"
     if result.share <= 0.0:

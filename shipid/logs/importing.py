@@ -423,6 +423,7 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
         place, share = f"columns.{name}.from", {"factor", "curve"} & column.model_fields_set
         units = (column.unit, *(["%"] if share else []))
         parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
+        parts = [np.where(np.isin(one, column.missing), np.nan, one) for one in parts] if column.missing else parts
         names, coded = source_columns(column.source), column.unit in CODES and (column.unit != "deg" or len(parts) > 1)
         numbers = decode_numbers(parts, names, column.unit, table, other, place) if coded else parts[0]
         if column.curve is not None:

@@ -202,7 +202,8 @@ class Column(StrictPart):
     source column: dead band, neutral and stops of a servo, or a throttle.
 
     The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds; of a heading the
-    four of a quaternion. `latency` [s]: how late samples are stamped; `interpolation`: the rule between samples.
+    four of a quaternion. `missing`: numbers in the log that stand for no value of this column. `latency` [s]: how late
+    samples are stamped; `interpolation`: the rule between samples.
     """
 
     source: Named | Four = Field(alias="from")
@@ -211,6 +212,7 @@ class Column(StrictPart):
     factor: float = 1.0
     offset: float = 0.0
     curve: Annotated[tuple[tuple[FiniteFloat, FiniteFloat], ...], Field(min_length=2)] | None = None
+    missing: tuple[FiniteFloat, ...] = ()
     sign: Literal[-1, 1] = 1
     frame: Literal["body", "earth"] = "body"
     direction: Literal["towards", "from"] | None = None

@@ -36,7 +36,7 @@ class Signal:
     mirror : sign under port-starboard reflection.
     column : whether a dataset must, may, or cannot have this column. Commands and outputs are always allowed.
     names : regular expression of its names in logs, in lower case and without the unit; empty: not in logs.
-    plausible : largest plausible magnitude [SI]; None: not checked.
+    plausible : a magnitude [SI] that no craft reaches; None: not checked.
     read_as_SI : a log column without a unit is read as SI up to this magnitude, in `shown` above it.
     reach : least and greatest value [SI] in the tests of physical laws.
     usual : the same of a command in normal operation: the default range of a simulated truth.
@@ -95,7 +95,7 @@ SIGNALS |= {
         "speed ahead",
         column="required",
         names=r"u|surge|surge_?(speed|vel\w*)|vx|u_?b(ody)?|speed_?long\w*|dx0?",
-        plausible=25.0,
+        plausible=50.0,  # the SES-100B of 1980 made 91.9 kn, 47 m/s
     ),
     "v": Signal(
         "motion",
@@ -104,7 +104,7 @@ SIGNALS |= {
         mirror=-1,
         column="required",
         names=r"v|sway|sway_?(speed|vel\w*)|vy|v_?b(ody)?|speed_?(trans|lat)\w*|dy0?",
-        plausible=10.0,
+        plausible=25.0,  # a drift of 30 deg at 50 m/s
     ),
     "r": Signal(
         "motion",
@@ -115,7 +115,7 @@ SIGNALS |= {
         mirror=-1,
         column="required",
         names=r"r|rot|yaw_?rate|rate_?of_?turn|psi_?dot|dpsi\w*|wz",
-        plausible=0.6,
+        plausible=2 * math.pi,  # a turn a second: small craft on two screws turn at 100 to 200 deg/s
     ),
     "z": Signal("motion", "m", "heave", column="optional"),
     "phi": Signal(
@@ -128,7 +128,7 @@ SIGNALS |= {
         mirror=-1,
         column="optional",
         names=r"phi|roll",
-        plausible=1.0,
+        plausible=math.pi / 2,  # on its beam ends
         read_as_SI=0.8,
     ),
     "theta": Signal(
@@ -140,7 +140,7 @@ SIGNALS |= {
         angle=True,
         column="optional",
         names=r"theta|pitch",
-        plausible=0.5,
+        plausible=math.pi / 2,
         read_as_SI=0.8,
     ),
     "w": Signal("motion", "m/s", "speed down", column="optional"),
@@ -163,7 +163,7 @@ SIGNALS |= {
         "wind speed",
         column="optional",
         names=r"v_?w|(true_?)?wind_?(speed)?|tws",
-        plausible=60.0,
+        plausible=113.0,  # the strongest gust on record, Barrow Island 1996 (WMO)
         reach=(0.0, 20.0),
     ),
     "beta_w": Signal(
@@ -202,7 +202,7 @@ SIGNALS |= {
         factor=RPM,
         shaft=True,
         names=r"n_?(port|stbd|starboard|stern|bow)?|rpm\w*|rev\w*|rps\w*|shaft\w*|\w+_(rpm|shaft|rev)|n_p|n_s",
-        plausible=40.0,
+        plausible=100.0,  # 6000 rpm: an outboard, or the electric screw of a small craft
         read_as_SI=25.0,
         reach=(-3.5, 3.5),
         usual=(50 * RPM, 200 * RPM),

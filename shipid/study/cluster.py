@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
@@ -34,15 +35,16 @@ Result = TypeVar("Result")
 log = logging.getLogger(__name__)
 
 
-def journal_by_topic(content: bytes, study: str, topic: str) -> Journal:
+def journal_by_topic(content: bytes, study: str, topic: str, file: Path) -> Journal:
     """The journal of a task on a worker: what is added to it is sent by a topic of the scheduler.
 
-    content : of its file in the folder of the run; what a worker that died has sent since is added.
+    content : of its file in the folder of the run; what a worker that died has sent since is added. ResultError with
+    the name of the file where that is damaged.
     """
     from dask.distributed import get_client, get_worker
 
     sent = (lines for _, lines in get_client().get_events(topic))
-    return Journal(content + b"".join(sent), partial(get_worker().log_event, topic), study)
+    return Journal(content + b"".join(sent), partial(get_worker().log_event, topic), study, file)
 
 
 def on_dask(

@@ -286,8 +286,8 @@ def _on_cluster(
     """A unit on a worker of a cluster: what it was computed with, before and after, and the results."""
     (plan, prepared, device, code, members), (unit, journal) = shared, task
     add_members(members)
-    session = session_on(device, code_at_worker(plan, code))
-    results = run_unit(plan, prepared, unit, device, journal_by_topic(journal, plan.digest, topic))
+    session, file = session_on(device, code_at_worker(plan, code)), Path(store.JOURNALS, f"{unit.key}.log")
+    results = run_unit(plan, prepared, unit, device, journal_by_topic(journal, plan.digest, topic, file))
     return [session, {**session, "engine": engine_description()}], results
 
 

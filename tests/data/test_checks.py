@@ -7,6 +7,8 @@ import pandas as pd
 import pytest
 
 from shipid.data.checks import check_dataset, white_noise_of
+from shipid.data.dataset import cumulative_integral
+from tests.drawn import seeds
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 120.0, 0.5)
@@ -29,7 +31,7 @@ def test_clean_log_passes() -> None:
     [
         (lambda f: f.drop(index=range(50, 60)).reset_index(drop=True), {"gap", "jitter"}),
         (lambda f: f.assign(t=f["t"] + np.random.default_rng(0).uniform(-0.1, 0.1, len(f))), {"jitter"}),
-        (lambda f: f.assign(r=np.degrees(f["r"])), {"range r"}),
+        (lambda f: f.assign(r=60 * np.degrees(f["r"])), {"range r"}),
         (lambda f: f.assign(**{"port.n": f["port.n"] * 60}), {"range port.n"}),
         (lambda f: f.iloc[np.repeat(np.arange(0, 240, 2), 2)].reset_index(drop=True).assign(t=T), {"frozen"}),
     ],
@@ -44,6 +46,36 @@ def test_defect_fails_its_check(defect: Callable[[pd.DataFrame], pd.DataFrame], 
         frame[name] = np.append(0.0, np.cumsum((rate[1:].to_numpy() + rate[:-1].to_numpy()) / 2 * 0.5))
     assert failed(frame) == set()
     assert caught <= failed(defect(frame))
+
+
+def test_a_small_craft_on_the_spot_passes() -> None:
+    """It turns at 36 to 200 deg/s, its electric screws at 60 rev/s."""
+    for rate in np.radians([36.0, -120.0, 200.0]):
+        t = np.arange(0.0, 30.0, 0.05)
+        assert failed(turning(t, u=0.3, v=0.0, r=rate).assign(**{"port.n": 60.0 * np.sin(t)})) == set()
+
+
+@pytest.mark.parametrize("signal", ["psi", "r", "course", "speed"])
+@pytest.mark.parametrize("seed", seeds(1, 5))
+def test_a_stuck_sensor_is_named_and_a_steady_one_is_not(signal: str, seed: int) -> None:
+    """One sensor repeats its value for a fifth of a run in which the ship slows down, speeds up and turns."""
+    random = np.random.default_rng(seed)
+    pace = random.uniform(0.3, 10.0)  # s
+    t = pace * np.arange(0.0, 100.0, random.choice([0.05, 0.1, 0.2]))
+    swing, speed = 0.3 / pace * np.sin(0.21 * t / pace), random.uniform(0.3, 8.0) * (1 + 0.4 * np.sin(0.13 * t / pace))
+    psi = random.uniform(-3, 3) + cumulative_integral(t, swing)
+    course = psi - 0.3 * np.sin(0.21 * t / pace)
+    place = cumulative_integral(t, speed * np.cos(course)) + 1j * cumulative_integral(t, speed * np.sin(course))
+    for share in (0.0, 0.2):
+        stuck = {"psi": psi.copy(), "r": swing.copy(), "course": course.copy(), "speed": speed.copy()}
+        first = int(random.uniform(0.1, 0.7) * len(t))
+        stuck[signal][first : first + int(share * len(t))] = stuck[signal][first]
+        body = stuck["speed"] * np.exp(1j * (stuck["course"] - stuck["psi"]))
+        frame = pd.DataFrame({"t": t, "north": place.real, "east": place.imag, "psi": stuck["psi"], "u": body.real})
+        table = check_dataset(as_dataset(frame.assign(v=body.imag, r=stuck["r"])))
+        (row,) = table[table["check"] == "frozen"].to_dict("records")
+        assert row["ok"] == (share == 0.0)
+        assert share == 0.0 or f"repeat the {signal} of the row before, which the other" in row["sentence"]
 
 
 @pytest.mark.parametrize("seed", [1])

@@ -508,10 +508,10 @@ ACCEPTED = {
     "current": "current",
     "current.by_run": "current by run",
     "wind.scale": "wind scale",
-    "damping.factor": "coefficient (damping|thrust)",
-    "thrust.factor": rf"coefficient (damping|thrust)|{SHAFT}scale",
-    "rudder.factor": f"{RUDDER}scale|coefficient rudder",
-    "mass.factor": r"coefficient mass|command \S* delay",
+    "damping.factor": "coefficient (damping|thrust)|several coefficients",
+    "thrust.factor": rf"coefficient (damping|thrust)|several coefficients|{SHAFT}scale",
+    "rudder.factor": f"{RUDDER}scale|coefficient rudder|several coefficients",
+    "mass.factor": r"coefficient mass|several coefficients|command \S* delay",
 }
 
 
@@ -521,7 +521,7 @@ def names_cause(key: str, cause: str) -> bool:
 
 
 def diagnose_log(log: FaultyLog, folder: Path) -> tuple[list[str], list[str]]:
-    """Write the document and the dataset, diagnose them: the named causes (`none` apart), and all their equals."""
+    """Write the document and the dataset, diagnose them: the causes that are named, and all their equals."""
     from shipid import Dataset, load_vessel, read_dataset, write_dataset  # what is judged, and its formats
     from shipid.identification.diagnosis import diagnose
 
@@ -529,7 +529,7 @@ def diagnose_log(log: FaultyLog, folder: Path) -> tuple[list[str], list[str]]:
     document.write_text(vessel_document(log))
     write_dataset(Dataset(dataset_frame(log), {}), table)
     causes, equals, result = [], [], diagnose(load_vessel(str(document)), read_dataset(table))
-    while result is not None and result.cause != "none":
+    while result is not None and result.cause not in ("none", "unexplained"):
         causes.append(result.cause)
         equals += list(result.equals)
         result = result.next

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from shipid.errors import ShipidError
+from shipid.errors import ResultError, ShipidError
 from shipid.study import cluster
 from shipid.study.cluster import on_dask
 from tests.faults.clusters import a_cluster, a_worker
@@ -56,6 +56,14 @@ def napping(seconds: float) -> Callable[[int, int, object], int]:
         return shared + task
 
     return work
+
+
+def test_a_damaged_journal_is_named_on_a_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    dask = importlib.import_module("dask.distributed")
+    monkeypatch.setattr(dask, "get_client", lambda: type("Client", (), {"get_events": lambda *_: ()})())
+    monkeypatch.setattr(dask, "get_worker", lambda: type("Worker", (), {"log_event": print})())
+    with pytest.raises(ResultError, match=r"journals/unit\.log: damaged"):
+        cluster.journal_by_topic(b"no checksum\n", "", "topic", Path("journals/unit.log"))
 
 
 def test_no_scheduler_is_one_line() -> None:

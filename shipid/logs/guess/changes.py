@@ -22,6 +22,7 @@ Windows = NDArray[np.bool_]
 Change = tuple[tuple[str, ...], str, list[int]]
 """Columns that it is about, a sentence with a place for where it is, and numbers of the parts."""
 STRETCHES, FEWEST = 10, 20  # of one log; windows of a file or stretch that decides, at least
+CLEAR = 4.0  # times the misfit of the better unit, that the other leaves at least
 SCALED = 0.005  # share of a motion that one scale leaves, at least, where there are two
 APART = np.radians(1.0)  # by which the track keeps to a heading more than to a course, at least
 UNDER_WAY = 0.4  # of the larger speeds: below, thrust turns a ship as much as an angle does
@@ -35,7 +36,8 @@ def ask_for_changes(state: State, pause: float) -> None:
         edges = np.linspace(0, len(state.t), STRETCHES + 1).astype(int).tolist()
     middle = (state.chosen.first + state.chosen.last) // 2
     parts = [(middle >= first) & (middle < end) for first, end in pairwise(edges)]
-    changes = [*_other_scales(state, parts), *_other_senses(state, parts, edges)]
+    changes = [*_other_units_of_heading(state, parts)] or [*_other_scales(state, parts)]
+    changes += _other_senses(state, parts, edges)
     changes += [*_course_as_heading(state, parts, middle), *_other_axes(state, parts, middle)] if files else []
     for about, words, odd in changes:
         ends = edges[odd[0]], min(edges[odd[-1] + 1], len(state.t) - 1)
@@ -80,6 +82,23 @@ def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[
     left = sum(fit.left * size for fit, size in zip(two, motion, strict=True)) / sum(motion)
     clear = one_left > SCALED and left < SETTINGS.two_left * one_left
     return (odd, two[0].scale / two[1].scale) if clear else ([], 1.0)
+
+
+def _other_units_of_heading(state: State, parts: list[Windows]) -> Iterator[Change]:
+    """Yield where the track turns with a heading in degrees, while elsewhere it turns with one in radians."""
+    psi = next((one.source for one in state.suggestions if one.name == "psi"), None)
+    values = state.columns.get(psi or "", 0.0 * state.t)[state.chosen.first]
+    track, ways = state.chosen.change(state.position), (np.exp(1j * values * to_si("deg", "psi")), np.exp(1j * values))
+    kinds: tuple[list[int], list[int]] = [], []
+    for number, part in enumerate(parts):
+        degrees, radians = (senses_of_angle(track[part], way[part])[0][0] for way in ways)
+        good, bad = sorted((degrees, radians))
+        in_radians = radians < degrees and bool(np.abs(values[part]).max(initial=0.0) < 3 * np.pi)
+        if part.sum() >= FEWEST and good < SETTINGS.poor and bad > max(CLEAR * good, SETTINGS.spread):
+            kinds[in_radians].append(number)
+    if all(kinds):
+        words = f"is {psi!r} in radians {{}}, and elsewhere in degrees, as the track turns? Then write it in one"
+        yield ("psi",), f"{words} unit, or cut it there, import the parts and join them (shipid data join)", kinds[True]
 
 
 def _course_as_heading(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:

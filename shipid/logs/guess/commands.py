@@ -33,7 +33,6 @@ TUNNELS = ("bow", "stern")  # places of a screw that does not drive the ship
 LARGEST = 47.0  # deg: of a rudder; what is larger may be no angle
 FASTEST, GEARED = 200.0, 5.0  # rev/s: no shaft is faster; an engine that is faster usually has a gear
 PULSES = (700.0, 2300.0)  # us: what a servo takes is about 1500, from 1000 to 2000
-OFTEN_ASTERN = 0.006  # share of the windows, from which a shaft without a sense is asked about
 NOISE = 0.02  # of the range of an order: less is no motion of it
 SERVO, OFF_SERVO = 1500.0, 100.0  # us: its middle, and how far a stopped screw may be from it
 SHARES = {
@@ -315,7 +314,9 @@ def _hides_astern(state: State, name: str) -> bool:
     before, after = (np.interp(state.t[rows], state.t[(first + last) // 2], ahead) for rows in (first, last))
     stopped = (before - after > 0.03) & (ahead * np.percentile(shaft, 90) < 0.5 * shaft)
     astern = (ahead < -0.1) | stopped & (turned < 0.3 * np.percentile(turned, 90))
-    return bool(state.columns[name].min() >= 0.0 and np.mean(astern & (shaft > 0.2 * shaft.max())) > OFTEN_ASTERN)
+    t, spans = state.t, evidence.row_spans(astern & (shaft > 0.2 * shaft.max()))
+    long = t[first[spans[:, 1] - 1]] - t[first[spans[:, 0]]] > 0.5 * np.median(t[last] - t[first])  # no mere change
+    return bool(state.columns[name].min() >= 0.0 and long.any())
 
 
 def _way_and_shaft(state: State, name: str) -> tuple[Array, Array]:

@@ -182,7 +182,9 @@ def _column_lines(guess: Guess) -> Iterator[str]:
     for column in guess.columns:
         sure = f"{100 * column.confidence:.0f} %{', UNSURE' * (column.confidence < LIKELY)}"
         parts = guess.sniffed.in_parts.get(column.source, (column.source,))
+        none = dict.fromkeys(x for one in {column.source, *parts} for x in guess.sniffed.fillers.get(one, ()))
         values = {"from": parts[0] if len(parts) == 1 else parts, "unit": column.unit, **column.extra}
+        values |= {"missing": list(none)} if none else {}
         key = f'"{column.name}"' if "." in column.name else column.name
         yield from _block(f"columns.{key}", values, f"{sure}: {column.evidence}")
     yield ""

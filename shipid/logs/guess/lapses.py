@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import FIRST_DATED_TIME, Array
-from shipid.data.lapses import find_command_faults
+from shipid.data.lapses import find_command_faults, stuck_spans
 from shipid.logs.dates import LAST_DATE, format_date
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
@@ -36,11 +36,6 @@ FAULTS = {
     ),
 }
 """Kind of a fault -> the kind of its finding, how sure it is, and what is seen."""
-LEAST, LONG, TURNED = (
-    4.5,
-    4.0,
-    np.radians(6.0),
-)  # of a stuck sensor: s; times the usual repetition; turn
 Spans = Sequence[tuple[int, int]] | NDArray[np.intp]
 """First row of each stretch, and the row after its last."""
 
@@ -108,24 +103,15 @@ def report_command_faults(state: State, sniffed: LogTable) -> None:
 
 
 def report_stuck_sensors(state: State) -> None:
-    """Report a heading, yaw rate or course that repeats one value for long while the ship turns."""
-    t, ends = state.t, np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))
-    ran = 0.0 * t if state.r is None else evidence.integrate_rate(t, state.r).real
-    for one in (one for one in state.suggestions if one.name in ("psi", "r", "course")):
-        values, steady = state.columns[one.source], state.r if one.name == "r" and state.r is not None else 0.0 * t
-        edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ends, [True]]))
-        lengths = np.diff(edges)
-        long = lengths >= LONG * np.median(np.repeat(lengths, lengths))
-        others = ran if one.name == "psi" else state.psi
-        spans = [
-            (int(first) + 1, min(int(last) + 2, len(t)))  # a jump that follows may be taken for one across 360
-            for first, last in zip(edges[:-1][long], edges[1:][long] - 1, strict=True)
-            if t[last] - t[first] >= LEAST
-            and abs(others[last] - others[first] - steady[first] * (t[last] - t[first])) > TURNED
-        ]
-        if spans:
-            fault = "frozen sensor", SURE, "repeats one value while the ship turns {}."
-            _report(state, fault, one.source, t, spans, (one.name,))
+    """Report a heading, yaw rate, course or speed that repeats one value for long while the ship moves otherwise."""
+    t, follows = state.t, np.diff(state.t) <= evidence.GAP * np.median(np.diff(state.t))
+    rates = 0.0 * t if state.r is None else state.r, 0j * t if state.velocity is None else state.velocity
+    for one in (one for one in state.suggestions if one.name in ("psi", "r", "course", "speed")):
+        spans = stuck_spans(one.name, t, state.columns[one.source], (state.psi, state.position), rates, follows)
+        if spans:  # a jump that follows may be taken for one across 360
+            rows = [(first + 1, min(last + 2, len(t))) for first, last in spans]
+            fault = "frozen sensor", SURE, "repeats one value while the ship moves otherwise {}."
+            _report(state, fault, one.source, t, rows, (one.name,))
 
 
 def report_spikes(state: State) -> None:

@@ -18,7 +18,6 @@ from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, split_amounts
 from shipid.logs.cells import OFF_ONE, text_numbers
 from shipid.logs.formats import LOOKED_AT, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
-    Rows,
     are_whole,
     clock_restarts,
     clock_without_repeats,
@@ -91,6 +90,7 @@ class LogTable:
     seams : places where rows were not read, or runs begin. runs : column that says the run, and their number, where the
     clock begins again with each. sides : letters that columns beside positions hold. words : columns of words, with
     their first. other : columns that cannot be read, and why. doubts : questions on dates. in_parts : of several.
+    fillers : column -> numbers that stand for no value of it.
     """
 
     form: dict[str, Any]
@@ -105,6 +105,7 @@ class LogTable:
     other: dict[str, str] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     in_parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    fillers: dict[str, list[float]] = field(default_factory=dict)
 
     @property
     def scattered(self) -> bool:
@@ -153,6 +154,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         if READERS[form["kind"]].scattered:  # a time alone, before the first fix, is no row
             table = table.loc[table.drop(columns="time").notna().any(axis=1)].reset_index(drop=True)
     other: dict[str, str] = table.attrs.get("other", {})
+    fillers: dict[str, list[float]] = {}
     _refuse_ships(table, file)
     table, in_units, mixed = _without_units(table)
     decimal = form.get("decimal", ".")
@@ -162,10 +164,14 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     columns |= dict(in_text.values())
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
-        missing = [*_words_for_nothing(table, columns, model), *_missing_value_texts(table, columns)]
+        missing, fillers = _words_for_nothing(table, columns, model), _take_fillers(columns)
         if missing:
             form["missing"] = [*model.missing, *missing]
-            notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
+        said = [
+            *map(repr, missing),
+            *(f"{', '.join(map('{:.10g}'.format, fillers[one]))} of {one!r}" for one in fillers),
+        ]
+        notes += tuple(f"{one} stands for a value that is missing" for one in said)
     for values in columns.values():  # of no ship, and squares would overflow
         values[np.abs(values) > np.finfo(np.float32).max] = np.nan
     made = _degree_columns(columns) | _quaternion_columns(columns)
@@ -204,6 +210,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         other,
         doubts if runs else (*doubts, *other_clocks(table.loc[once], columns, clock, t)),
         in_parts,
+        fillers,
     )
 
 
@@ -417,9 +424,9 @@ def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: Tab
     return [text for text in texts if text not in form.missing and NO_VALUE.fullmatch(text.lower())]
 
 
-def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
-    """The texts that stand for a missing value, set to NaN: far beyond all other values of a column."""
-    texts: dict[str, None] = {}
+def _take_fillers(columns: dict[str, Array]) -> dict[str, list[float]]:
+    """Column -> numbers that stand for a missing value of it, far beyond all its others; they are set to NaN."""
+    fillers: dict[str, list[float]] = {}
     for name, values in columns.items():
         never = {value: most for one in meaning_scores(name) for value, most in NOT_AVAILABLE.get(one, {}).items()}
         finite = values[np.isfinite(values)]
@@ -435,17 +442,14 @@ def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list
             if value in never:
                 known = max(-low, high) > never[value]
             elif value not in SENTINELS:  # of no recorder that is known
-                known = not _is_filler(values, value) or _other_column_has(table, name, hit)
+                known = not _is_filler(values, value)
             else:
                 known = low - max(high - low, -low) <= value <= high + max(high - low, high)
                 known |= low == high == 0.0 and 0.0 < value < 1000.0
             if not known:
-                texts |= dict.fromkeys(column_called(table, name)[hit].astype(str).str.strip())
+                fillers.setdefault(name, []).append(float(value))
                 values[hit] = np.nan
-    for name, values in columns.items() if texts else ():  # the import takes them so in every column
-        if not is_clock(name):
-            values[column_called(table, name).astype(str).str.strip().isin(texts).to_numpy()] = np.nan
-    return list(texts)
+    return fillers
 
 
 def _is_filler(values: Array, value: float) -> bool:
@@ -457,13 +461,6 @@ def _is_filler(values: Array, value: float) -> bool:
     usual, many = np.abs(others), len(np.unique(others)) > LEVELS
     on_and_off = not many and np.median(usual) <= usual.max() / BEYOND
     return bool(abs(value) > (BEYOND if many else BEYOND_LEVELS) * usual.max() and not on_and_off)
-
-
-def _other_column_has(table: pd.DataFrame, name: str, hit: Rows) -> bool:
-    """Whether another column of a table holds a text that one of this name has in some rows (N,)."""
-    texts = column_called(table, name)[hit].astype(str).str.strip().unique()
-    others = (table.iloc[:, index] for index, one in enumerate(map(str, table.columns)) if one != name)
-    return any(other.astype(str).str.strip().isin(texts).any() for other in others)
 
 
 def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
@@ -479,5 +476,5 @@ def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
         lost |= "n" in meant and others.min() > 10.0
         if lost:
             span = f"{others.min():g} to {others.max():g}"
-            remedy = "Then take it out of the log, or list it in [format] missing if no other column has such a value"
-            yield f"{name!r} is -1 in {int(hit.sum())} rows and {span} in the others: is there no value? {remedy}"
+            words = f"{name!r} is -1 in {int(hit.sum())} rows and {span} in the others"
+            yield f"{words}: is there no value? Then write missing = [-1] for it"

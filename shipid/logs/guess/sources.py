@@ -169,6 +169,7 @@ def _join_files(logs: list[LogTable]) -> LogTable:
     form |= next(({"thousands": log.form["thousands"]} for log in logs if "thousands" in log.form), {})
     missing = dict.fromkeys(text for log in logs for text in log.form.get("missing", ()))
     form |= {"missing": list(missing)} if missing else {}
+    fillers = {name: [x for log in logs for x in log.fillers.get(name, ())] for name in names}
     rates = [log.clock["every"] for log in logs if "every" in log.clock]
     clock = first.clock | ({"every": float(np.median(rates))} if rates else {})
     clock |= {"repeated": "drop"} if any("repeated" in log.clock for log in logs) else {}
@@ -178,6 +179,7 @@ def _join_files(logs: list[LogTable]) -> LogTable:
         clock=clock,
         t=t,
         columns=columns,
+        fillers=fillers,
         notes=tuple(dict.fromkeys(note for log in logs for note in log.notes)),
         seams=sum(log.seams for log in chosen) + len(chosen) - 1,
         doubts=tuple(dict.fromkeys(doubt for log in logs for doubt in log.doubts)),

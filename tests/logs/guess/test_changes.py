@@ -45,6 +45,21 @@ def test_a_change_of_unit_or_sign_is_asked_with_its_time(
     assert min(abs(time - 0.4 * END) for time in times) < 0.15 * END, asked[0]  # to one stretch and a half
 
 
+@pytest.mark.parametrize("rate", [True, False])
+@pytest.mark.parametrize("radians_first", [True, False])
+def test_a_heading_that_changes_its_unit_is_asked(radians_first: bool, rate: bool, tmp_path: Path) -> None:
+    """The track turns with the heading in degrees in one part, in radians in the other; a yaw rate is not blamed."""
+    log = CLEAN if rate else CLEAN.drop(columns="r")
+    for share in (0.55, 0.0):
+        radians = (CLEAN["time"] < share * END) == radians_first
+        if share == 0.0:
+            radians[:] = radians_first
+        result = guess_of(tmp_path, log.assign(psi=log["psi"].where(~radians, np.radians(log["psi"])).round(4)))
+        asked = [one.sentence for one in result.questions]
+        assert sum("is 'psi' in radians from t = " in sentence for sentence in asked) == (share > 0.0), asked
+        assert not [sentence for sentence in asked if "another unit or sign" in sentence]
+
+
 def test_a_log_of_one_unit_is_not_asked(tmp_path: Path) -> None:
     asked = [one.sentence for one in guess_of(tmp_path, CLEAN).questions]
     assert not [sentence for sentence in asked if "another unit or sign" in sentence]

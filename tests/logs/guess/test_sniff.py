@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pymap3d import ned2geodetic
 from scipy.io import savemat
 
 from shipid.errors import DataError
 from shipid.logs.guess.clock import name_without_unit
 from shipid.logs.guess.layout import split_cells
 from shipid.logs.guess.sniff import recognise_log
+from shipid.logs.importing import read_mapping
 from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, sniff, text
+from tests.logs.simulated import as_bridge, drafted, si_log
 
 
 def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None:
@@ -83,7 +86,8 @@ def test_a_number_for_missing_values_is_reported_and_not_taken(tmp_path: Path, w
     rows = [f"{k},{np.sin(k):.3f},{360 * ((0.01 * k) % 1):.1f}" for k in range(80)]
     rows[40] = f"40,{word},{word if word != '-99.0' else '144.0'}"
     sniffed = recognise_log(log_of(tmp_path, ["time,x,heading", *rows]))
-    assert sniffed.form["missing"][-1] == word
+    assert "missing" not in sniffed.form
+    assert sniffed.fillers["x"] == [float(word)]
     assert np.isnan(sniffed.columns["x"][40])
     assert np.nanmax(np.abs(sniffed.columns["heading"])) <= 360
 
@@ -106,7 +110,7 @@ def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: st
     sniffed = recognise_log(
         log_of(tmp_path, [f"time,{name},rpm", *(f"{k},{one},{k % 3}" for k, one in enumerate(held))])
     )
-    assert sniffed.form["missing"][-1] == str(value)
+    assert sniffed.fillers == {name: [value]}
     assert np.isnan(sniffed.columns[name]).sum() == 4
 
 
@@ -130,9 +134,9 @@ def test_a_number_far_beyond_all_others_again_and_again_is_a_missing_value(
     ]
     sniffed = recognise_log(log_of(tmp_path, ["time,psi,n", *rows]))
     assert np.isnan(sniffed.columns["n"]).any() == lost
-    assert (value in sniffed.form.get("missing", [])) == lost
+    assert sniffed.fillers == ({"n": [float(value)]} if lost else {})
     rows[9] = f"4.5,{value},{others[0]}"  # of another column it is a value
-    assert "missing" not in recognise_log(log_of(tmp_path, ["time,psi,n", *rows])).form
+    assert np.isfinite(recognise_log(log_of(tmp_path, ["time,psi,n", *rows])).columns["psi"]).all()
 
 
 @pytest.mark.parametrize(
@@ -171,7 +175,7 @@ def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tm
     sniffed = recognise_log(
         log_of(tmp_path, ["time,heading,rpm", *(f"{k},{k % 360}.5,{n}" for k, n in enumerate(speeds))])
     )
-    assert "missing" not in sniffed.form
+    assert sniffed.fillers == {}
     assert sniffed.columns["rpm"].tolist() == speeds.tolist()
 
 
@@ -248,7 +252,7 @@ def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path
     table = TABLE.assign(rudder=np.sin(T)).astype(object)
     table.loc[4:7, "rudder"] = value
     sniffed = sniff(tmp_path, table)
-    assert value in sniffed.form["missing"]
+    assert sniffed.fillers["rudder"] == [float(value)]
     assert np.flatnonzero(np.isnan(sniffed.columns["rudder"])).tolist() == [4, 5, 6, 7]
 
 
@@ -270,3 +274,22 @@ def test_minus_one_is_asked_where_nothing_else_is_negative(
     values = np.where(np.isin(np.arange(len(T)), (3, 11)), -1.0, others)
     doubts = sniff(tmp_path, TABLE.drop(columns="psi").assign(**{name: values})).doubts
     assert [doubt.partition(" and ")[0] for doubt in doubts] == [f"{name!r} is -1 in 2 rows"] * asked
+
+
+@pytest.mark.parametrize("east", [89.9, 90.95])
+def test_a_number_for_none_belongs_to_its_column(east: float, tmp_path: Path) -> None:
+    """Before, a longitude of 91 vanished where the receiver wrote a latitude of 91 for no fix."""
+    log = si_log(4)
+    latitude, longitude, _ = ned2geodetic(log["north"], log["east"], 0.0, 12.0, east, 0.0)
+    frame = as_bridge(log).round(4).drop(columns=["N", "E"])
+    frame = frame.assign(Lat=latitude.round(6), Lon=longitude.round(6))
+    frame.loc[1000, "Lon"] = 91.0
+    frame.loc[[400, 401, 1500], "Lat"] = 91.0
+    proposal, dataset = drafted(frame, tmp_path)
+    assert proposal.source.sniffed.fillers == {"Lat": [91.0]}
+    assert "missing" not in proposal.source.sniffed.form
+    mapping = read_mapping(tmp_path / "draft.toml")
+    assert mapping.columns["latitude"].missing == (91.0,)
+    assert mapping.columns["longitude"].missing == ()
+    if east > 90.0:  # a true place: no row of it is lost
+        assert np.isin(log["t"].to_numpy()[[999, 1000, 1001]], dataset.frame["t"]).all()
