@@ -145,7 +145,7 @@ def _answer(task: Any) -> bytes:
 def _one_thread() -> Iterator[None]:
     """Processes started meanwhile use one thread, whatever they import, and keep memory that they have freed."""
     before = dict(os.environ)
-    os.environ.update({"GLIBC_TUNABLES": KEPT_MEMORY} | ONE_THREAD)
+    os.environ.update({"GLIBC_TUNABLES": KEPT_MEMORY} | before | ONE_THREAD)  # a user may know better
     try:
         yield
     finally:
