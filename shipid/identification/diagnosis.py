@@ -10,7 +10,7 @@ the water or of the numbers of the vessel; it is fitted alone by Gauss-Newton fr
 `exchange A B` (two thrusters); `sensor S bias` (u, v, r, psi), `scale` (u, v, r, velocity), `sign` (v, r, psi), `delay`
 (u, v, r, psi, velocity, position); `heading is course`; `lever arm position`, `lever arm position and velocity`,
 `lever arm velocity`; `current`, `current by run`, `velocity through water`; `wind scale`, `wind direction`;
-`coefficient damping`, `mass`, `thrust`, `rudder`; besides `none` and `cannot tell`.
+`coefficient damping`, `mass`, `thrust`, `rudder`, `several coefficients`; besides `none`, `unexplained`, `cannot tell`.
 
 **Classes of equals**, which no or hardly any log tells apart (each with the run that would):
 
@@ -47,6 +47,10 @@ makes them err is seen on the log with its noise once more.
   then the best by kinematics. If others do so, its equals apart, the answer is `cannot tell`, and `equals` are these
   causes; if its class does, these are `equals`.
 - Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
+- Where no cause is named, or two are of forces, all coefficients are fitted at once: `several coefficients` must be
+  better than chance and explain a share `WORTH`. What is left then is judged by itself. A zero of an angle beside wrong
+  forces is said where it is better by a standard error: mirror images tell it.
+- `unexplained` is a misfit without a name that leaves more than a share `POOR` of the error of constant u, v, r.
 - `current by run` must lower the misfit more than an unknown force of each run, such as a wind that the log lacks, and
   by more than the share `ALIKE` than any other cause.
 - A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
@@ -662,7 +666,7 @@ def diagnose(
     motion = log.motion
     first, fit = _judge(log, causes)
     if fit is None:
-        return replace(first, sentence=first.sentence + _zeros_beside(log, causes, first))
+        return replace(first, sentence=first.sentence + _describe_zeros(log, causes, first))
     _repair(log, fit, fit.motion)
     second, other = _judge(log, [one for one in causes if one.name != fit.cause.name])
     if other is not None and fit.cause.is_of_forces and other.cause.is_of_forces:  # two of them: all are a guess
@@ -682,11 +686,11 @@ def diagnose(
         if first.cause in (NONE, UNCLEAR, UNEXPLAINED):
             first, second = second, first
     words = f"{first.sentence}; without that, {second.sentence}" if first.cause not in (NONE, UNEXPLAINED) else ""
-    both = replace(first, sentence=words + _zeros_beside(log, causes, first, second), next=second)
+    both = replace(first, sentence=words + _describe_zeros(log, causes, first, second), next=second)
     return both if words else first
 
 
-def _zeros_beside(log: _Log, causes: Sequence[Cause], *found: Diagnosis) -> str:
+def _describe_zeros(log: _Log, causes: Sequence[Cause], *found: Diagnosis) -> str:
     """Zeros of angles that show beside wrong forces, in words: mirror images tell them, however far paths err."""
     names, words = {result.cause for result in found}, ""
     if UNEXPLAINED not in names and not any(one.is_of_forces for one in causes if one.name in names):

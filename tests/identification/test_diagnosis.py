@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,14 +12,17 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.diagnosis import NONE, UNCLEAR, _VesselLog, diagnose
-from shipid.vessel.load import load_vessel
+from shipid.identification.causes import SEVERAL
+from shipid.identification.diagnosis import NONE, POOR, UNCLEAR, UNEXPLAINED, _VesselLog, diagnose
+from shipid.vessel.load import Vessel, check_document, load_vessel
 from tests.identification.faulty_logs import (
+    FaultyLog,
     dataset_frame,
     diagnose_log,
     draw_faulty_log,
     draw_ship,
     judge_causes,
+    simulate_runs,
     vessel_document,
 )
 from tests.identification.trials import changed, noisy, trials
@@ -92,6 +96,46 @@ def test_a_sound_log_is_not_blamed(seed: int) -> None:
     found = diagnose(SHIP, log_of(seed))
     assert found.cause == NONE
     assert "no single cause" in found.sentence
+
+
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize("number", [0, 4, 9])
+def test_dead_reckoning_of_an_exact_log_is_exact_from_its_first_row_on(number: int, every: int) -> None:
+    """Before, paths from the begin of a run started a quarter of a step late: an error of a 64th of the length."""
+    ship = draw_ship(number, 77)
+    table = simulate_runs(ship, np.random.default_rng(number), 6, 0.0, 0.5)
+    log = FaultyLog(ship, ship.fit, {key: x[:, ::every] for key, x in table.items()}, (), (), (), "none", windy=False)
+    found = diagnose(None, Dataset(dataset_frame(log), {"clock": "run"}))
+    assert found.cause == NONE
+    assert found.error < 6e-4 * found.ahead * ship.U
+
+
+def first_guess_of(number: int, factor: float, zero: float) -> tuple[Vessel, Dataset]:
+    """A log of a drawn ship with a zero of its rudder [rad], and its document with factors of several forces."""
+    random, ship = np.random.default_rng(number), draw_ship(number, 78)
+    wrong = {name: float(x * factor ** random.choice([-1.0, 1.0])) for name, x in ship.fit.items()}
+    table = simulate_runs(ship, random, 8, 0.0, 0.5)
+    log = FaultyLog(ship, wrong, table | {"delta": table["delta"] + zero}, (), (), (), "none", windy=False)
+    document = tomllib.loads(vessel_document(log))
+    return check_document(document, "guess.toml"), Dataset(dataset_frame(log), {"clock": "run"})
+
+
+@pytest.mark.parametrize("number", [0, 1, *(pytest.param(one, marks=pytest.mark.slow) for one in (4, 6, 7, 9, 10))])
+def test_a_first_guess_that_is_far_off_is_never_passed_over(number: int) -> None:
+    """Before, it was "none" where no single cause explained paths that are hardly better than none."""
+    guess, log = first_guess_of(number, 1.8, 0.0)
+    found = diagnose(guess, log)
+    assert found.error > POOR * found.held
+    assert found.cause != NONE
+    words = {SEVERAL: "shipid identify", UNEXPLAINED: "hardly better than constant u, v, r"}
+    assert words.get(found.cause, "would") in found.sentence
+
+
+@pytest.mark.parametrize("number", [1, 4, *(pytest.param(one, marks=pytest.mark.slow) for one in (0, 3, 6))])
+def test_a_zero_of_the_rudder_is_said_beside_several_wrong_forces(number: int) -> None:
+    """Before, a first guess hid it: paths are hardly better without it."""
+    guess, log = first_guess_of(number, 1.25, 0.06)
+    assert "command rudder.delta zero = 0.0" in diagnose(guess, log).sentence
 
 
 @pytest.mark.parametrize(("seed", "number"), [(50001, 19), (50001, 53), (50002, 115)])

@@ -105,7 +105,8 @@ def report_command_faults(state: State, sniffed: LogTable) -> None:
 def report_stuck_sensors(state: State) -> None:
     """Report a heading, yaw rate, course or speed that repeats one value for long while the ship moves otherwise."""
     t, follows = state.t, np.diff(state.t) <= evidence.GAP * np.median(np.diff(state.t))
-    rates = 0.0 * t if state.r is None else state.r, 0j * t if state.velocity is None else state.velocity
+    over_ground = np.zeros(len(t), dtype=np.complex128) if state.velocity is None else state.velocity
+    rates = 0.0 * t if state.r is None else state.r, over_ground
     for one in (one for one in state.suggestions if one.name in ("psi", "r", "course", "speed")):
         spans = stuck_spans(one.name, t, state.columns[one.source], (state.psi, state.position), rates, follows)
         if spans:  # a jump that follows may be taken for one across 360
