@@ -15,6 +15,7 @@ from shipid.data.dataset import (
     Array,
     Dataset,
     clock_slack,
+    cumulative_integral,
     shares_clock,
     stretches_by_run,
     stretches_of_runs,
@@ -29,6 +30,8 @@ GAP_STEPS = 3.0  # usual steps: a longer one is a time without rows
 JITTER_LIMIT, FROZEN_LIMIT, OVERLAP_LIMIT = 0.05, 0.02, 0.5
 ROUGHNESS_RATIO = 1.2  # times, on an uneven clock or on an even one: this one is wrong, by more than the noise hides
 DRIFT_SECONDS = 30.0
+TURN_RATIO = 6.0  # far from 1, and from the 57 of degrees taken for radians
+ALIKE_TURNS = 0.9  # least correlation of turns by r and by the heading
 
 
 def check_dataset(dataset: Dataset) -> pd.DataFrame:
@@ -111,9 +114,29 @@ def _check_ranges(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         row = signal_row(name)
         if row is not None and row.plausible is not None:
             largest = max(float(rows[name].abs().max()) for rows in stretches)
-            unit = unit_of_column(name) or ""
+            unit, limit = unit_of_column(name) or "", row.plausible
             sentence = f"{name} reaches {largest:.3g} {unit}: right unit?"
-            yield _check_row(f"range {name}", largest, unit, row.plausible, sentence)
+            if name == "r" and (times := _turn_ratio(stretches)) > TURN_RATIO:
+                sentence, limit = f"r is {times:.3g} times as fast as the heading turns: right unit?", largest / times
+            yield _check_row(f"range {name}", largest, unit, limit, sentence)
+
+
+def _turn_ratio(stretches: list[pd.DataFrame]) -> float:
+    """How many times as fast as the heading r turns, by what both leave of a line in time; 1 where they are not alike.
+
+    A bias of r is such a line. A heading that turns a quarter of a circle in a step says nothing.
+    """
+    products = np.zeros((2, 2))
+    for rows in stretches:
+        t, psi, r = (rows[name].to_numpy() for name in ("t", "psi", "r"))
+        turned = np.unwrap(psi)
+        if len(t) > 2 and np.abs(np.diff(turned)).max() < np.pi / 2:
+            turns = np.stack([cumulative_integral(t, r), turned], axis=1)
+            line = np.stack([np.ones(len(t)), t - t.mean()], axis=1)
+            turns -= line @ np.linalg.lstsq(line, turns)[0]
+            products += turns.T @ turns
+    (by_rate, both), (_, by_heading) = products
+    return float(both / by_heading) if both > ALIKE_TURNS * (by_rate * by_heading) ** 0.5 else 1.0
 
 
 def white_noise_of(*stretches: Array) -> float:

@@ -43,7 +43,9 @@ class StoredData:
         try:
             made: Self = _rebuild_value(cls, header, arrays, "")
         except KeyError as error:
-            raise ResultError("missing in the saved method", path=str(error.args[0])) from None
+            raise ResultError(
+                "missing in the saved method: another version wrote it, so run the study again", path=str(error.args[0])
+            ) from None
         return made
 
 

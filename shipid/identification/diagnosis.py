@@ -775,7 +775,8 @@ def _judge_physics(
         if gain > -ndtri(LEVEL / len(causes)) * error and before - left > WORTH * whole:
             return _describe(replace(result, cause=SEVERAL, share=1 - left / before), fit), fit
     if before > POOR * log.held:
-        words = "that is hardly better than constant u, v, r: look at units, orders and water, or identify the vessel"
+        words = f"{before / log.held:.2g} times the error of constant u, v, r"
+        words += ": look at units, orders and water, or identify the vessel"
         result = replace(result, cause=UNEXPLAINED, sentence=f"{result.sentence}; {words}")
     return result, best
 

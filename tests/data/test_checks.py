@@ -31,6 +31,7 @@ def test_clean_log_passes() -> None:
     [
         (lambda f: f.drop(index=range(50, 60)).reset_index(drop=True), {"gap", "jitter"}),
         (lambda f: f.assign(t=f["t"] + np.random.default_rng(0).uniform(-0.1, 0.1, len(f))), {"jitter"}),
+        (lambda f: f.assign(r=np.degrees(f["r"])), {"range r"}),
         (lambda f: f.assign(r=60 * np.degrees(f["r"])), {"range r"}),
         (lambda f: f.assign(**{"port.n": f["port.n"] * 60}), {"range port.n"}),
         (lambda f: f.iloc[np.repeat(np.arange(0, 240, 2), 2)].reset_index(drop=True).assign(t=T), {"frozen"}),

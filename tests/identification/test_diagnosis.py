@@ -127,7 +127,7 @@ def test_a_first_guess_that_is_far_off_is_never_passed_over(number: int) -> None
     found = diagnose(guess, log)
     assert found.error > POOR * found.held
     assert found.cause != NONE
-    words = {SEVERAL: "shipid identify", UNEXPLAINED: "hardly better than constant u, v, r"}
+    words = {SEVERAL: "shipid identify", UNEXPLAINED: "times the error of constant u, v, r"}
     assert words.get(found.cause, f"{found.cause} = ") in found.sentence
 
 
