@@ -225,7 +225,9 @@ def _mean_errors(results: Results, errors: pd.Series[float]) -> str:
 def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
     """How good physics must be to pay, at the smallest and at the largest amount of data; then which models do."""
     if NO_MODEL not in case.table.H:
-        yield "It is unknown whether physics harms, since not every cell without physics has a result."
+        planned = NO_MODEL in set(case.rows["model"])
+        why = "not every cell without physics has a result" if planned else "no method here predicts without physics"
+        yield f"It is unknown whether physics harms, since {why}."
         return
     limits, counts = {}, {}
     for amount, place in case.ends.items():

@@ -215,12 +215,12 @@ class _Log:
         self.plain_errors = self.path_errors(self.motion)
         more = self.path_errors(self.motion.put(noisy)).mean() ** 2 - self.plain_errors.mean() ** 2
         self.blind = float(np.hypot(max(more, 0.0) ** 0.5, self.blur))
-        self.held = float(self.path_errors(self.motion, held=True).mean())
 
     def repair(self, motion: Motion) -> None:
         """Take another motion for the log."""
         self.motion, self.smoothed = motion, {}
         self.plain_residuals = self.residuals(motion)
+        self.held = float(self.path_errors(motion, held=True).mean())
 
     def causes(self) -> list[Cause]:
         """What may be wrong with the log."""

@@ -128,7 +128,7 @@ def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
     methods = [{"name": "kernel", "kind": "kernel", "families": ["good", "bad"]}]
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
     assert "8 s ahead, good (best in validation) with 30 runs errs by 1.00 m" in advice
-    assert "It is unknown whether physics harms, since not every cell without physics has a result." in advice
+    assert "It is unknown whether physics harms, since no method here predicts without physics." in advice
 
 
 def test_methods_without_physics_are_answered_with_their_errors(made: Any) -> None:
