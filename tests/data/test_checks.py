@@ -144,3 +144,18 @@ def test_the_noise_of_a_straight_signal_is_that_put_into_it() -> None:
     assert white_noise_of(line + noise) == pytest.approx(0.5, rel=0.05)
     assert white_noise_of(line) < 1e-9
     assert white_noise_of(noise[:4]) == 0.0  # too few to say
+
+
+@pytest.mark.parametrize("seed", seeds(1, 20))
+def test_a_yaw_rate_in_degrees_fails_and_one_with_a_bias_and_noise_passes(seed: int) -> None:
+    """On straight runs, steps of the helm to both sides and circles, of ships that turn slowly enough for any limit."""
+    random = np.random.default_rng(seed)
+    t = np.arange(0.0, 200.0, random.choice([0.2, 1.0, 2.0]))
+    turn = np.radians(random.uniform(0.5, 3.0))  # 3 taken for rad/s is below the limit
+    for true in (0.0 * t, turn * np.sign(np.sin(0.1 * t)), turn * (t > 60.0)):
+        psi = cumulative_integral(t, true) + random.normal(0.0, 0.002, len(t))
+        read = true + random.normal(0.0, 0.002, len(t)) + random.normal(0.0, 0.01)
+        log = turning(t, u=3.0, v=0.0).assign(psi=np.angle(np.exp(1j * psi)))
+        assert "range r" not in failed(log.assign(r=read))
+        if true.any():
+            assert "range r" in failed(log.assign(r=np.degrees(read)))
