@@ -163,22 +163,6 @@ def data_segment(
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 
 
-@app.command("join")
-def data_join(
-    datasets: Annotated[list[Path], typer.Argument(help="datasets of one vessel, two or more")],
-    out: Annotated[Path, typer.Option(help="dataset (Parquet) to write")],
-    as_json: Json = False,
-) -> None:
-    """Join datasets of one vessel, such as those of several days or recorders."""
-    from shipid.logs.joining import join_datasets
-
-    check_output(out, endings=(".parquet",))
-    joined, notes = join_datasets({file: shipid.read_dataset(file) for file in datasets})
-    with open_answer(as_json) as answer:
-        answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-        answer.say_dataset(joined, shipid.write_dataset(joined, out))
-
-
 @app.command("check")
 def data_check(
     dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],

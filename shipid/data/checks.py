@@ -22,7 +22,7 @@ from shipid.data.dataset import (
     travelled_position,
     unit_of_column,
 )
-from shipid.data.lapses import Plane, stuck_spans
+from shipid.data.stuck import Plane, stuck_spans
 from shipid.errors import DataError
 from shipid.physics.signals import signal_row
 

@@ -395,7 +395,7 @@ def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
     """
     file = as_path("file", file, DataError)
     if os.path.isdir(file):
-        raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
+        raise DataError("is a folder: name one dataset", file=file)
     try:
         with open_file(file) as stream:
             table = read_arrow(stream)

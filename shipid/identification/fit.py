@@ -14,7 +14,7 @@ Pereyra, Inverse Problems 19 (2003) R1 (variable projection), with the Jacobian 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -366,35 +366,14 @@ def _gauss_newton(J: Array, f: Array) -> tuple[Array, Array, float]:
 def evaluate_factors(problem: Problem, factors: Array, point: Point) -> _Evaluation:
     """Residuals and Jacobian at given factors (n,), with the unknowns of the runs at their optimum."""
     at = _eliminate_run_unknowns(problem, factors, point)
-    whole = _run_triangles(problem, at, problem.num_factors)
+    whole = _run_triangles(problem, at)
     return _Evaluation(factors, at, whole[:, -1], whole[:, :-1])
 
 
-def local_linearisation(problem: Problem, factors: Array, point: Point) -> Callable[[Array], tuple[Array, Array]]:
-    """Function of a change of the factors (n,) to residuals (m,) and Jacobian (m, n) there, priors included.
-
-    Unknowns of the runs go along to first order, and by one step of Gauss-Newton. Not finite where it diverges.
-    """
-    here = predict_residuals(problem, factors, point.nuisances, point.away)
-
-    def linearised(change: Array) -> tuple[Array, Array]:
-        with np.errstate(all="ignore"):
-            to = point
-            if point.nuisances.size or point.away.size:
-                moved = replace(here, r=here.r + here.by_factor @ change)
-                steps, _ = _run_steps(problem, moved, problem.settings.linear_from)
-                to = Point(*_apply_run_steps(problem, here, steps, np.ones(len(problem.runs))))
-            there = predict_residuals(problem, factors + change, to.nuisances, to.away)
-            whole = _run_triangles(problem, there, problem.num_factors + 1)
-        return whole[:, -1], whole[:, :-1]
-
-    return linearised
-
-
-def _run_triangles(problem: Problem, at: ResidualPrediction, columns: int) -> Array:
+def _run_triangles(problem: Problem, at: ResidualPrediction) -> Array:
     """Jacobian and residuals (m, n + 1), with the priors of the factors; the triangular factor of each run.
 
-    columns : how many of the columns lose what the unknowns of the runs can do; n where these are at their optimum.
+    The Jacobian loses what the unknowns of the runs can do; these are at their optimum.
     """
     parts, n = list[Array](), problem.num_factors
     f, J, A = _robust_residuals(at, problem.settings.linear_from)
@@ -406,7 +385,7 @@ def _run_triangles(problem: Problem, at: ResidualPrediction, columns: int) -> Ar
             if len(xi):
                 both = np.vstack([both, np.column_stack([np.zeros((len(xi), n)), xi])])
                 basis = np.linalg.qr(np.vstack([slopes, np.eye(len(xi))]))[0]
-                both[:, :columns] -= basis @ (basis.T @ both[:, :columns])
+                both[:, :n] -= basis @ (basis.T @ both[:, :n])
             parts.append(np.asarray(np.linalg.qr(both, mode="r")))
     else:
         parts.append(np.full((1, n + 1), np.nan))

@@ -43,7 +43,7 @@ from shipid.identification.free_run import (
     simulate_free_runs,
 )
 from shipid.identification.plausible import implausibility
-from shipid.identification.profile import Profile, curvature_warning, profile_factor, profile_table, variance_ratio
+from shipid.identification.profile import Profile, profile_factor, profile_table, variance_ratio
 from shipid.identification.settings import (
     BLOCK,
     Identify,
@@ -62,7 +62,6 @@ from shipid.identification.statistics import (
     pooled_autocorrelation,
     runs_of_signal,
 )
-from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.interrupts import hold_interrupts
 from shipid.report.identification import IdentificationContent
 from shipid.simulation.measured import TRIALS, MeasuredManoeuvre
@@ -290,7 +289,6 @@ def run_identification(
             manoeuvres = manoeuvres.merge(
                 ends[["manoeuvre", "measure", "low", "high"]], how="left", on=["manoeuvre", "measure"]
             )
-        curved = curvature_warning(solution, dataset, judged, determined)
         _go_on(held)
         if programme:
             ranked, lacking = _next_manoeuvres(identified, dataset, fitted, solution, judged)
@@ -300,8 +298,7 @@ def run_identification(
             *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
-            *_fit_warnings(solution, judged, free, yaw_growth_rate(dataset, fitted, identified), settings),
-            curved,
+            *_fit_warnings(solution, judged, free, settings),
             *_better_fit_warnings(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"
@@ -581,11 +578,11 @@ def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> Itera
 
 
 def _fit_warnings(
-    solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float, settings: Identify
+    solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], settings: Identify
 ) -> list[str]:
     """Warnings about the fit: coloured residuals, horizon, untrusted errors, bounds, no test, worse free runs.
 
-    rate : at which a small yaw of the identified ship grows [1/s]. settings : as given, with what priors they name.
+    settings : as given, with what priors they name.
     """
     warnings, coloured = list[str](), memory_of_signals(solution, judged)
     horizon = solution.settings.horizon
@@ -597,16 +594,12 @@ def _fit_warnings(
             f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the "
             f"model, or the wind and current data, are incomplete{starts}"
         )
-        grown = growth_warning(rate, _longest_run(solution), longest)
         if 0 < horizon < LONG * longest:
             longer = [f"{significant_digits(LONG * longest)} s"] if LONG * longest < _longest_run(solution) else []
-            longer += [] if grown else ["whole runs (horizon 0)"]
             warnings.append(
                 f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals"
-                + (f"; compare with {', or '.join(longer)}" if longer else "")
+                f"; compare with {', or '.join([*longer, 'of a course-stable ship whole runs (horizon 0)'])}"
             )
-        if grown and not horizon:
-            warnings.append(grown)
     best = judged.covariances[judged.chosen]
     if not best.trusted:
         warnings.append(f"standard errors ({best.kind}) are not to be trusted: {best.reason}")

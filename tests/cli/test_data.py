@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.study.store import DATASET
-from tests.cli.running import BAD, ended, output_of
+from tests.cli.running import BAD, output_of
 from tests.logs.simulated import as_bridge, si_log
 
 
@@ -65,11 +65,3 @@ def test_data_fetch_from_the_folder(shared_data: Path, monkeypatch: pytest.Monke
     file = Path(output_of("data", "fetch", "gunnerus-2022").strip())
     assert file.is_file()
     assert shared_data in file.parents
-
-
-def test_data_join_of_a_link_to_itself_is_refused(tmp_path: Path, tiny_run: Path) -> None:
-    loop = tmp_path / "loop.parquet"
-    loop.symlink_to(loop)
-    code, _, error = ended("data", "join", tiny_run / DATASET, loop, "--out", tmp_path / "all.parquet")
-    assert code == 1
-    assert error.startswith(f"error: {loop}: cannot be read")

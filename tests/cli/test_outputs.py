@@ -59,7 +59,6 @@ def test_what_is_read_is_not_written(words: str, there: Path) -> None:
     "words",
     [
         "data import gunnerus-2022 --out a.csv",
-        "data join log.parquet b.parquet --out a.csv",
         "simulate quick --out a.csv",
         "manoeuvre mariner zigzag 10 10 --log a.csv",
         "manoeuvre mariner zigzag 10 10 --out a.htm",

@@ -10,9 +10,8 @@ import pandas as pd
 import pytest
 from pymap3d import geodetic2ned, ned2geodetic
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.logs.frames import PARALLEL, meridian_convergence, unwrap_in_place
-from shipid.logs.joining import join_datasets
 from tests.drawn import seeds
 from tests.logs.conftest import import_written, turning
 
@@ -132,18 +131,15 @@ def test_far_from_the_origin_a_ship_moves_as_near_it(speeds: str, wind: str, tmp
 
 
 @pytest.mark.parametrize("seed", seeds(3, 5))
-def test_recordings_joined_are_one_recording(seed: int, tmp_path: Path) -> None:
-    """Two days at places up to 100 km apart, imported alone and joined, or with the origin of the first."""
+def test_recordings_of_two_days_with_one_origin_are_one_dataset(seed: int, tmp_path: Path) -> None:
+    """At places up to 100 km apart: what the how-to does in place of a command."""
     random = np.random.default_rng(seed)
     place = float(random.choice([-1, 1]) * random.uniform(40, 80)), float(random.uniform(-175, 175))
-    other = away(place, random.uniform(2e4, 9e4), random.uniform(0.5, 2.5))
-    logs = recorded(place), recorded(other, u=5.0, begin=500.0)
-    days = [imported(log, tmp_path) for log in logs]
-    named = [Dataset(day.frame.assign(run=name), day.metadata) for day, name in zip(days, "ab", strict=True)]
-    whole, notes = join_datasets({Path(f"{name}.parquet"): day for name, day in zip("ab", named, strict=True)})
-    far = imported(logs[1], tmp_path, more=origin((days[0].metadata["origin"]["latitude"], place[1])))
-    rows = whole.select(["b"]).frame
-    assert "and turned with all directions by" in notes[0]
-    np.testing.assert_allclose(rows["psi"], far.frame["psi"], atol=2e-4)
-    np.testing.assert_allclose(rows["beta_w"] - rows["psi"], far.frame["beta_w"] - far.frame["psi"], atol=1e-9)
-    np.testing.assert_allclose(rows[["north", "east"]], far.frame[["north", "east"]], atol=0.1)
+    distance, towards = random.uniform(2e4, 9e4), random.uniform(0.5, 2.5)
+    logs = recorded(place), recorded(away(place, distance, towards), u=5.0, begin=500.0)
+    a, b = (imported(log, tmp_path, more=origin(place)) for log in logs)
+    rows = pd.concat([a.frame.assign(run="a"), b.frame.assign(run="b")], ignore_index=True)
+    whole = read_dataset(write_dataset(Dataset(rows, a.metadata), tmp_path / "ab.parquet"))
+    assert whole.runs == ["a", "b"]
+    begun = whole.frame.groupby("run")[["north", "east"]].first() @ [1, 1j]
+    assert begun["b"] - begun["a"] == pytest.approx(distance * np.exp(1j * towards), rel=(distance / 6.37e6) ** 2)

@@ -64,7 +64,7 @@ def _other_scales(state: State, parts: list[Windows]) -> Iterator[Change]:
         if odd:
             words = f"has {' and '.join(repr(sources[name]) for name in sorted(about))} another unit or sign {{}}?"
             words += f" There the motion is {ratio:.3g} times as much, beside its integral, as elsewhere. Write the log"
-            yield about, f"{words} in one unit, or cut it there, import the parts and join them (shipid data join)", odd
+            yield about, f"{words} in one unit, or cut it there", odd
 
 
 def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[int], float]:
@@ -98,7 +98,7 @@ def _other_units_of_heading(state: State, parts: list[Windows]) -> Iterator[Chan
             kinds[in_radians].append(number)
     if all(kinds):
         words = f"is {psi!r} in radians {{}}, and elsewhere in degrees, as the track turns? Then write it in one"
-        yield ("psi",), f"{words} unit, or cut it there, import the parts and join them (shipid data join)", kinds[True]
+        yield ("psi",), f"{words} unit, or cut it there", kinds[True]
 
 
 def _course_as_heading(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:

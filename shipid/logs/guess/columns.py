@@ -21,7 +21,7 @@ from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import Clue, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import defects_of_motion, defects_of_rows
-from shipid.logs.guess.lapses import report_command_faults, report_spikes, report_stuck_sensors, take_fills, take_spikes
+from shipid.logs.guess.lapses import report_spikes, report_stuck_sensors, take_fills, take_spikes
 from shipid.logs.guess.motion import check_clock, choose_motion, report_misnomers
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.scales import take_scales
@@ -123,7 +123,6 @@ def guess(
     _choose_other_columns(state)
     choose_wind(state)
     defects_of_rows(state, sniffed)
-    report_command_faults(state, sniffed)
     report_stuck_sensors(state)
     report_spikes(state)
     ask_for_changes(state, PAUSE)

@@ -149,7 +149,7 @@ def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str,
             reason = f"lacks {', '.join(map(repr, lacking[:3]))}, which the others have"
             if kept.pop(file, None) is None:
                 reason = "written otherwise than the others (separator, decimal sign, encoding, header or clock)"
-            skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone, then `shipid data join`"
+            skipped[file.relative_to(folder).as_posix()] = f"{reason}: guess it alone"
     if not kept:
         raise DataError("no two files have the same columns: guess them one by one", file=folder)
     return kept

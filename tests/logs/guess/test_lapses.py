@@ -1,4 +1,4 @@
-"""Lapses of commands are drafted with what mends them, or asked about where they may be orders."""
+"""A sensor that is stuck is drafted with the repair that breaks the run there."""
 
 from __future__ import annotations
 
@@ -8,62 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.logs.guess.columns import guess
-from shipid.logs.importing import read_mapping
 from tests.drawn import seeds
-from tests.logs.simulated import as_bridge, globe, guess_of, import_draft, si_log
-
-
-def test_lapses_of_commands_are_drafted_and_mended(tmp_path: Path) -> None:
-    """Before, a shaft that is 0 for two seconds, and a rudder of 90 deg in one row, came into the dataset silently."""
-    clean = globe(0)
-    frame = clean.copy()
-    for place in (300, 1200, 2000):
-        frame.loc[place : place + 3, "rpm"] = 0.0
-        frame.loc[place + 20, "rudder"] = 90.0
-    expected, proposal = guess_of(tmp_path, clean), guess_of(tmp_path, frame)
-    assert "lapses of a command" not in expected.kinds
-    found = {one.columns: one for one in proposal.findings if one.kind == "lapses of a command"}
-    assert set(found) == {("rpm",), ("rudder",)}
-    assert "is 0 in 12 rows at 3 places" in found["rpm",].sentence
-    assert f"t = {clean['time'][300]:g}" in found["rpm",].sentence
-    log, mended = si_log(0), import_draft(tmp_path, proposal)
-    shaft = next(one.name for one in proposal.columns if one.source == "rpm")
-    truth = np.interp(mended.frame["t"], log["t"], log["n"])
-    assert mended.frame[shaft].to_numpy() == pytest.approx(truth, abs=0.05)
-
-
-def test_what_may_be_an_order_is_asked_and_stays_as_it_is(tmp_path: Path) -> None:
-    """Zeros between equal orders, and a rudder that stands still through a zigzag."""
-    frame = globe(1)
-    order = np.where(np.arange(len(frame)) < 1500, 100.0, 120.0)
-    for place in (300, 1200, 2000):
-        order[place : place + 3] = 0.0
-    frame["rpm"] = order
-    proposal = guess_of(tmp_path, frame)
-    (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
-    assert found.columns == ("rpm",)
-    words = "Was that ordered? Unless it was so, switch the repair on"
-    asked = [one.sentence for one in proposal.questions if words in one.sentence]
-    assert len(asked) == 1
-    assert "'rpm' is 0 in 9 rows at 3 places" in asked[0]
-    dataset = import_draft(tmp_path, proposal)
-    mapping = read_mapping(tmp_path / "draft.toml")
-    assert not any(repair.enabled for repair in mapping.repair if repair.kind in ("break", "despike"))
-    assert len(dataset.frame) == len(frame)
-
-
-def test_lapses_in_files_of_a_folder_are_asked(tmp_path: Path) -> None:
-    """A repair would have times of one file."""
-    frame = globe(0)
-    frame.loc[300:303, "rpm"] = 0.0
-    for number, rows in enumerate(np.array_split(np.arange(len(frame)), 2)):
-        frame.iloc[rows].to_csv(tmp_path / f"run{number}.csv", index=False)
-    proposal = guess(tmp_path)
-    (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
-    (asked,) = (one for one in proposal.questions if "'rpm' is 0" in one.sentence)
-    assert found.repair is None
-    assert asked.sentence.endswith("Unless it was so, leave these cells empty, and draft again")
+from tests.logs.simulated import as_bridge, guess_of, si_log
 
 
 def turning_log(seed: int) -> pd.DataFrame:
