@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.lapses import clock_text
 from shipid.logs.guess.search import senses_of_angle
 from shipid.logs.guess.settings import SETTINGS
+from shipid.logs.guess.words import unit_in_name
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_command, is_steering
 

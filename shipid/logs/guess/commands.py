@@ -11,7 +11,7 @@ import numpy as np
 from shipid.data.dataset import Array
 from shipid.logs.frames import may_wrap
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_of_another
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import (
     ORDERS,
@@ -23,6 +23,7 @@ from shipid.logs.guess.words import (
     name_parts,
     number_in_name,
     side_in_name,
+    unit_in_name,
     units_in_name,
 )
 from shipid.logs.mapping import UNITS, to_si

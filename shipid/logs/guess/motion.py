@@ -9,7 +9,7 @@ import numpy as np
 
 from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, si_unit, unit_in_name
+from shipid.logs.guess.clues import STRONG, State, si_unit
 from shipid.logs.guess.evidence import Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
@@ -26,7 +26,7 @@ from shipid.logs.guess.search import (
     search_motion,
 )
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores
+from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores, unit_in_name
 from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
 from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
@@ -333,6 +333,9 @@ def report_misnomers(state: State) -> None:
         usual = written or ("m/s" if rare else one.unit)
         if max(scores.get(name, 0.0) for name in names) < 0.45 and one.confidence > 0.5:
             state.find("other name", (one.source,), one.confidence, f"{one.source!r} is {one.name}: {one.evidence}")
+            if signal in ("u", "v", "r") and max(scores.values(), default=0.0) >= STRONG:
+                words = f"is {one.source!r} {one.name}? By its name it is another quantity, by the motion it is this"
+                state.ask((signal,), words)
         if one.unit != usual and written != "%":
             says = f"its name says {written}" if written else "nothing says so"
             state.find("other unit", (one.source,), one.confidence, f"{one.source!r} is in {one.unit}, and {says}")

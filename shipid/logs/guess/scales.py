@@ -8,9 +8,9 @@ import numpy as np
 from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
-from shipid.logs.guess.clues import State, factor_in_name, unit_in_name
+from shipid.logs.guess.clues import State
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import meaning_scores, units_in_name
+from shipid.logs.guess.words import factor_in_name, meaning_scores, unit_in_name, units_in_name
 from shipid.logs.mapping import UNITS, degrees_and_minutes
 from shipid.units import DEGREE
 

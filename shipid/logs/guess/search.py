@@ -23,11 +23,11 @@ from shipid.errors import DataError
 from shipid.logs.amounts import is_amount
 from shipid.logs.frames import PARALLEL, meridian_convergence
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, names_another, unit_in_name
+from shipid.logs.guess.clues import State, names_another
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.scales import TURNS, turn_of_jumps
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores, name_parts
+from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores, name_parts, unit_in_name
 from shipid.logs.mapping import UNITS, rate_of_ais, to_si
 from shipid.physics.signals import rows_of_role
 
@@ -41,6 +41,7 @@ OTHER_WAY = frozenset("w west ouest oeste vest south sud sur syd zuid".split())
 YAW = frozenset(["yaw", "theta"])
 MOST_COLUMNS, MOST_WINDOWS = 24, 400  # that are tried where no name helps; in the first ranking
 PLAIN = ("m/s", "kn", "km/h")  # units of speed that logs usually have
+VELOCITIES = ("u", "v", "velocity_north", "velocity_east")
 WAYS = ("north", "east", "south", "west")
 
 
@@ -479,12 +480,15 @@ def _is_compass(name: str) -> bool:
 def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) -> Iterator[Velocity]:
     """Yield pairs of columns whose integral is the track: velocities of the Earth or of the ship, speed and course."""
     turn, used = np.exp(1j * theta), {pose.place.first, pose.place.second, pose.heading}
+    plain = {*state.eligible(*VELOCITIES)}  # no word of their names says another quantity
     for one in [*_pairs_of_velocities(state, used, seen, turn), *_speeds_and_courses(state, used, seen)]:
         fit = _fit_of_path(state, seen, one.ground)
         sure, usual = one.named >= (0.75 if one.kind == "course" else 0.45), _is_speed_unit(fit.scale)
+        against = one.kind != "course" and not {one.first, one.second} <= plain
         if fit.scale <= 0 or not (sure or usual) or fit.left > (SETTINGS.named_left if sure else SETTINGS.left):
             continue
         cost = one.cost + float(np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + one.named))) + (not usual)
+        cost += SETTINGS.odd * against
         unsure, drift = False, _drift_in_turns(state, one.ground, theta)
         if one.kind == "body":  # against its mirror image, by the track, and by a ship's drift out of its turns
             mirror = _fit_of_path(state, seen, np.conj(one.ground / turn) * turn)
@@ -492,6 +496,8 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
             cost += max(by_track, 0.0) - float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)
             cost += 0.1 * (one.side != pose.sense.sign)
             unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
+            if against and by_track > -SETTINGS.alike_left:
+                continue  # the second says nothing of the track
         elif one.kind == "course" and drift > 0.5 and not pose.astern:
             ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
             unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left
@@ -503,24 +509,26 @@ def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
     return evidence.fit_without_outliers(seen, state.chosen.change(evidence.integrate_rate(state.t, ground)))
 
 
-def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Complex) -> list[Velocity]:
-    """The pairs of columns that may be velocities of the Earth or of the ship, by name and by a rough fit."""
-    words = ("u", "v", "velocity_north", "velocity_east")
-    named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
-    free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:MOST_COLUMNS]
-    total, found = float(np.sum(np.abs(seen) ** 2)), list[tuple[float, Velocity]]()
-    for kind, way in (("earth", np.ones_like(turn)), ("body", turn)):
-        paths = {one: evidence.integrate_rate(state.t, state.columns[one] * way) for one in free if one not in used}
-        changes = {name: state.chosen.change(path) for name, path in paths.items()}
-        for (first, a), (second, b), side in product(changes.items(), changes.items(), (1, -1)):
-            ran = a + 1j * side * b
-            cross, said = float(np.real(np.vdot(ran, seen))), _names_of_velocities(kind, first, second)
-            rough = 1.0 - cross**2 / max(float(np.sum(np.abs(ran) ** 2)) * total, 1e-300)
+def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Complex) -> Iterator[Velocity]:
+    """Yield pairs of columns that may be velocities of the Earth or of the ship, by name and by a rough fit."""
+    free = [name for name in state.movable("u") if name not in used]
+    free.sort(key=lambda name: -max(meaning_scores(name).get(word, 0.0) for word in VELOCITIES))
+    free, total, found = free[:MOST_COLUMNS], float(np.sum(np.abs(seen) ** 2)), list[tuple[float, Velocity]]()
+    ways = {"earth": np.ones_like(turn), "body": turn}
+    for kind in ways if len(free) > 1 else ():
+        paths = (evidence.integrate_rate(state.t, state.columns[one] * ways[kind]) for one in free)
+        ran = np.stack([state.chosen.change(path) for path in paths])
+        products, ahead, abeam = np.conj(ran) @ ran.T, (np.conj(ran) @ seen).real, (np.conj(ran) @ seen).imag
+        for (a, first), (b, second), side in product(enumerate(free), enumerate(free), (1, -1)):
+            cross, said = ahead[a] + side * abeam[b], _names_of_velocities(kind, first, second)
+            power = products[a, a].real + products[b, b].real - 2.0 * side * products[a, b].imag
+            rough = 1.0 - cross**2 / max(power * total, 1e-300)
             if first != second and cross > 0 and (rough < 0.9 or said >= 0.45):
-                ground = np.asarray((state.columns[first] + 1j * side * state.columns[second]) * way, np.complex128)
-                one = Velocity(kind, first, second, side, ground, said, cost=float(kind == "earth" and side < 0))
+                one = Velocity(kind, first, second, side, seen, said, cost=float(kind == "earth" and side < 0))
                 found.append((rough / (SETTINGS.unnamed + said), one))
-    return [one for _, one in sorted(found, key=lambda entry: entry[0])[:16]]
+    for _, one in sorted(found, key=lambda entry: entry[0])[:16]:
+        ground = state.columns[one.first] + 1j * one.side * state.columns[one.second]
+        yield replace(one, ground=ground * ways[one.kind])
 
 
 def _names_of_velocities(kind: str, first: str, second: str) -> float:
@@ -576,10 +584,7 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
     if float(np.std(change)) < np.radians(0.5):
         return
     called, used = state.all_called("r"), {pose.place.first, pose.place.second, pose.heading}
-    others = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and not names_another(name, "r")]
-    for name in dict.fromkeys([*state.eligible("r"), *others]):
-        if name in used:
-            continue
+    for name in (name for name in state.movable("r") if name not in used):
         for unit, values in (("", state.columns[name]), ("ais", rates_of_ais(state, name))):
             if values is None:
                 continue
@@ -590,9 +595,10 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
             off = abs(scale / UNITS["rad/s"][unit] - 1)
             score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
             command = meaning_scores(name).keys() & rows_of_role("command").keys()
-            limit = SETTINGS.named_left if score else SETTINGS.left if command or is_order(name) else 0.3
-            if fit.left < limit and off < (0.35 if score else SETTINGS.left if name in others else 0.35):
-                cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off
+            against = not score and names_another(name, "r")
+            limit = SETTINGS.named_left if score else SETTINGS.left if command or against or is_order(name) else 0.3
+            if fit.left < limit and off < (0.35 if score else SETTINGS.left):
+                cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off + SETTINGS.odd * against
                 yield Rate(name, unit, fit, float(cost))
 
 
