@@ -25,8 +25,6 @@ from shipid.data.dataset import (
     clock_slack,
     optional_columns,
     required_columns,
-    sample_columns,
-    stretches_of_runs,
     unit_of_column,
     units_of_columns,
 )
@@ -37,7 +35,6 @@ from shipid.logs.channels import (
     Channel,
     close_gaps,
     common_instants,
-    instants_at_step,
     interpolation_rule,
     resample_channel,
 )
@@ -103,7 +100,7 @@ def import_log(
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
     course, latitude or longitude, `despike` of a heading that turns velocities over ground, position on the Earth to
     north and east, and directions to the north of that plane, gaps, speed and course or earth-fixed to body velocities,
-    the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs, resampling.
+    the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs.
     `metadata["repairs"]` counts every repair, `flags` marks its rows.
 
     file : the log; with `source.runs`, the folder of its files. without : kinds of repair to leave out.
@@ -161,8 +158,7 @@ def import_log(
     frame = frames[0] if len(frames) == 1 else pd.concat(frames, ignore_index=True)
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
-    dataset = Dataset(frame, metadata)
-    return _resample_log(dataset, mapping.resample.step, source) if mapping.resample else dataset
+    return Dataset(frame, metadata)
 
 
 def run_files(source: LogSource, log: Path) -> dict[str, Path]:
@@ -562,19 +558,3 @@ def _name_run(rows: pd.DataFrame, run: str) -> pd.DataFrame:
     named = rows.copy(deep=False)
     named.insert(0, "run", pd.Series(run, index=rows.index, dtype="str"))
     return named
-
-
-def _resample_log(dataset: Dataset, step: float, file: Path) -> Dataset:
-    """Rows `step` [s] apart; the first row of a stretch keeps its flags, so breaks stay."""
-
-    def resample() -> Iterator[pd.DataFrame]:
-        for run, rows in stretches_of_runs(dataset):
-            t = rows["t"].to_numpy()
-            instants = instants_at_step(t[0], t[-1] + clock_slack(t), step, [t], file, "resample.step")
-            frame = pd.DataFrame({"t": instants, **sample_columns(rows, instants)})
-            frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
-            # a break that stays flagged while its row is held over several instants would break each of them
-            bit = 1 << FLAGS.index(BREAK)
-            yield frame.assign(flags=frame["flags"] & np.where(np.arange(len(frame)) == 0, -1, ~bit))
-
-    return Dataset(pd.concat(list(resample()), ignore_index=True)[list(dataset.frame.columns)], dataset.metadata)

@@ -250,12 +250,6 @@ class RunParts(StrictPart):
     pause: float | None = Field(default=None, gt=0)
 
 
-class Resample(StrictPart):
-    """Instants `step` [s] apart from the start of every unbroken stretch."""
-
-    step: float = Field(gt=0)
-
-
 class Mapping(StrictPart):
     """A whole mapping; `repair` holds parameters in SI units."""
 
@@ -271,7 +265,6 @@ class Mapping(StrictPart):
     repair: tuple[SerializeAsAny[Repair], ...] = ()
     segment: tuple[Segment, ...] = ()
     parts: RunParts | None = None
-    resample: Resample | None = None
     digest: str
 
     @property
