@@ -273,7 +273,9 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
             alike = ranked[1][0] < 2.0 * max(ranked[0][0], 1e-9) or spread < SETTINGS.spread
             if ranked[0][0] > SETTINGS.poor:  # a ship that drifts far: any sense that is not against the track
                 ranked += [
-                    one for one in _all_senses(track, way) if one[0] < 1.0 and one[1] not in dict(ranked).values()
+                    one
+                    for one in senses_by_quarters(track, way)
+                    if one[0] < 1.0 and one[1] not in dict(ranked).values()
                 ]
             for misfit, sense in ranked if alike else ranked[:1]:
                 across = SETTINGS.quarter * (sense.sign > 0 and sense.quarter != 0)
@@ -291,7 +293,7 @@ def senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     return sorted(senses, key=lambda one: one[0])
 
 
-def _all_senses(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
+def senses_by_quarters(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     """All senses of an angle, exp(i angle) (W,), in the plane of a track (W,), with their misfits."""
     return [
         (1.0 - (mean * np.exp(-0.5j * np.pi * one)).real, Sense(sign, one))
