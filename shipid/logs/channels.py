@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import BREAK, clock_slack
 from shipid.errors import DataError
 from shipid.logs.cells import row_in_words
-from shipid.logs.dates import format_moment, rollover_words
+from shipid.logs.dates import format_moment
 from shipid.logs.frames import TURN, is_turn
 from shipid.logs.mapping import Column
 from shipid.logs.repairs import FLAGS, Records, interpolate_missing
@@ -61,7 +61,6 @@ def _instants_at_step(
     if count > MANY and count > FAR_MORE * len(samples := np.unique(np.concatenate(times))):
         row = int(np.argmax(np.diff(samples)))
         before, after = (format_moment(samples[row + one]) for one in (0, 1))
-        after += rollover_words(samples[row + 1] - samples[row])
         message = f"{step:g} s makes {count:.3g} instants of {len(samples)} rows, where after {before} comes {after}"
         remedy = (
             "was the clock set there? Remove the rows of the wrong time, or split the log; else write a longer step"

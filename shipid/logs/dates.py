@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
@@ -16,7 +15,6 @@ from shipid.data.dataset import FIRST_DATED_TIME, Array
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
-WEEKS = 7 * 1024  # days after which the week number of GPS begins again
 TIME_OF_DAY = r"\s*(\d\d?):(\d\d)(?::(\d\d(?:[.,]\d+)?))?\s*([AaPp][Mm])?\s*"
 MOMENT = rf"^(?:(.*?\S)(?:[\sT_]+|(?<=\D\d\d\d):))??{TIME_OF_DAY}$"
 """A date, if there is one, and a time of day: its groups are these, hour, minute, second, and half of the day."""
@@ -41,34 +39,12 @@ ISO = r"\d{4}-\d\d-\d\d[T ][\d:.]+\s*(?:Z|[+-][\d:]+)?"
 """A date and a time of day in ISO 8601."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
-_SAID = re.compile(
-    r"(?:\b(?:UTC|GMT)|\b(?:tz|time[ _]?zone|Zeitzone|UTC[ _]?offset)\W{1,4}(?:UTC|GMT)?)"
-    r"\s*[+-]\s*0?[1-9]\d?(?::?\d\d)?\b"
-    r"|\b(?:tz|time[ _]?zone|Zeitzone)\W{1,4}(?!UTC|GMT|Etc)[A-Z]\w+(?:/\w+)*|\blocal[ _]time\b|\b(?:Orts|Lokal)zeit\b"
-    r"|\blokale?[ _]?(?:tid|tijd)\b|\b(?:heure|ora)[ _]locale\b|\bhora[ _]local\b",
-    re.IGNORECASE,
-)
-"""A zone other than UTC in the head of a log, or in the name of its clock."""
-_SAID_OF_CLOCK = re.compile(
-    r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|LT"
-    r"|(?i:(?:heure |ora )?locale|local|lokale?(?:[ _]?(?:tid|tijd))?))(?![A-Za-z])"
-)
-"""A zone in letters, in the name of a clock alone."""
-ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
 DAYS = (
     *("%Y-%m-%d", "%Y-%j", "%d.%m.%Y", "%d.%m.%y", "%d-%b-%Y"),
     *("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%y-%m-%d"),
 )
 """Ways in which a date may be written, with - for any other mark than a point, and between eight digits."""
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
-
-
-def other_zone(head: str, clock: str, first: str) -> str:
-    """Say that a first time without a zone is read as UTC, where the head of a log, or its clock's name, has one."""
-    said = _SAID_OF_CLOCK.search(clock) or _SAID.search(f"{head}\n{clock}")
-    if said is None or re.search(f"{ZONE}|{UTC_BEHIND}|^{TIME_OF_DAY}$", first):
-        return ""
-    return f"{first!r} is read as UTC, and the log says {said[0]!r}"
 
 
 def parse_dates(dates: pd.Series[Any]) -> Array:
@@ -140,13 +116,6 @@ def format_date(moment: float) -> str:
 def format_moment(t: float) -> str:
     """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
     return f"{format_date(t)} UTC" if FIRST_DATED_TIME < t < LAST_DATE else f"{t:.10g} s"
-
-
-def rollover_words(step: float) -> str:
-    """Words for a step [s] of 1,024 weeks, to an hour, forward or back; empty for any other."""
-    remedy = f"add {WEEKS * DAY:.0f} s to the older dates"
-    words = f" (1,024 weeks apart: the week number of a GPS receiver rolled over, {remedy})"
-    return words if abs(abs(step) - WEEKS * DAY) < HOUR else ""
 
 
 def format_span(first: float, last: float) -> str:

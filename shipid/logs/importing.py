@@ -38,8 +38,7 @@ from shipid.logs.channels import (
     interpolation_rule,
     resample_channel,
 )
-from shipid.logs.dates import ZONE_REMEDY, format_moment, format_span, other_zone
-from shipid.logs.formats import TextFormat
+from shipid.logs.dates import format_moment, format_span
 from shipid.logs.frames import check_wraps, in_body, project_positions, true_wind, unwrap_angles
 from shipid.logs.instants import read_clock, read_time_column, without_repeats
 from shipid.logs.mapping import (
@@ -239,27 +238,12 @@ def _run_tables(
     whole_rows = mapping.clock.repeated == "drop" and mapping.clock.every is not None  # compared in all columns
     for run, file in logs.items():
         log = read_log_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
-        if file == next(iter(logs.values())):  # once for all of them
-            _warn_of_zone(log, mapping, file)
         first = 0
         for end in [*_clock_restart_rows(log, mapping, file), len(log)]:
             part = log.iloc[first:end] if first or end < len(log) else log
             part.attrs = {} if first else log.attrs
             yield run, file, part
             first = end
-
-
-def _warn_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
-    """Warn where dates without a zone count as UTC, and the head of the log or the name of its clock says another."""
-    if mapping.clock.unit != "date" or len(mapping.clock.sources) > 1:
-        return
-    (clock,), form, head = mapping.clock.sources, mapping.format, ""
-    if isinstance(form, TextFormat):
-        with file.open(encoding=form.encoding, errors="replace") as stream:
-            head = "".join(itertools.islice(stream, form.skip_rows))
-    first = str(log_column(table, clock, file, "clock.from").iloc[0]).strip()
-    if said := other_zone(head, clock, first):
-        logger.warning("%s: clock.from: %s: if it is the time there, %s", file.name, said, ZONE_REMEDY)
 
 
 def _clock_restart_rows(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:

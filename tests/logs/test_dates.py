@@ -119,40 +119,6 @@ def test_noon_and_midnight_of_twelve_hours() -> None:
     np.testing.assert_allclose(parse_dates(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
 
 
-@pytest.mark.parametrize(
-    ("head", "clock", "behind", "said"),
-    [
-        ("# tz=+01:00\n# vessel 7\n", "time", "", "tz=+01:00"),
-        ("Time zone: Europe/Oslo\n", "time", "", "Time zone: Europe/Oslo"),
-        ("all times are local time\n", "time", "", "local time"),
-        ("", "time (UTC+2)", "", "UTC+2"),
-        ("", "Zeit [MESZ]", "", "MESZ"),
-        ("", "heure locale", "", "heure locale"),
-        ("# tz=+01:00\n", "time", "+01:00", ""),
-        ("# tz=+00:00\n", "time", "", ""),
-        ("Time zone: UTC\n", "time (UTC)", "", ""),
-        ("est. speed in a local frame, 12-05-2024\n", "time", "", ""),
-    ],
-)
-def test_a_zone_that_only_the_head_says_is_warned_of(
-    head: str,
-    clock: str,
-    behind: str,
-    said: str,
-    log: pd.DataFrame,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    """Before, the times were counted as UTC without a word."""
-    moments = pd.Timestamp("2024-05-14T08:00:00") + pd.to_timedelta(log["time"], "s")
-    written = log.assign(time=moments.dt.strftime("%Y-%m-%d %H:%M:%S.%f") + behind).rename(columns={"time": clock})
-    (tmp_path / "log.csv").write_text(head + written.to_csv(index=False))
-    dated = ('from = "time"', f'from = "{clock}"\nunit = "date"')
-    mapping = mapping_with(tmp_path, f"skip_rows = {len(head.splitlines())}", dated)
-    import_log(read_mapping(mapping), tmp_path / "log.csv")
-    assert [f"is read as UTC, and the log says {said!r}" in one for one in caplog.messages] == [True] * bool(said)
-
-
 @pytest.mark.parametrize("zone", ["Z", "-0330"])
 def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log: pd.DataFrame, tmp_path: Path) -> None:
     """As UTC it would be hours off; with no zone anywhere every row is UTC."""
@@ -222,18 +188,6 @@ def test_a_date_in_one_number_beside_a_time_of_day(
     sniffed = recognise_log(file)
     assert sniffed.clock == {"from": "time", "unit": "date", "date": "Date"}
     np.testing.assert_allclose(sniffed.t, since, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("day", "other"), [("140524", "2014-05-24"), ("240514", "2024-05-14"), ("50624", "2024-05-06")]
-)
-def test_a_date_of_six_digits_that_may_be_another_is_asked(
-    day: str, other: str, log: pd.DataFrame, tmp_path: Path
-) -> None:
-    times = pd.to_datetime(T, unit="s").strftime("%H:%M:%S.%f")
-    log.assign(time=times, Date=day).to_csv(tmp_path / "log.csv", index=False)
-    (asked,) = recognise_log(tmp_path / "log.csv").doubts
-    assert other in asked
 
 
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:

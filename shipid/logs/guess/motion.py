@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import STRONG, State, si_unit
 from shipid.logs.guess.evidence import Fit
@@ -27,7 +26,7 @@ from shipid.logs.guess.search import (
 )
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores, unit_in_name
-from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
+from shipid.logs.mapping import UNITS, rate_of_ais, to_si
 from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
 
@@ -234,32 +233,21 @@ def _suggest_two(state: State, best: MotionReading, found: Velocity, unit: str, 
 
 
 def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool) -> tuple[str, float]:
-    """The likeliest unit by the scale and the name, and the part of it that is counted; another clock is asked."""
+    """The likeliest unit by the scale and the name, and the part of it that is counted."""
     name = sources[0]
     written = unit_in_name(name, "m/s")
     whole = quiet and float(np.mean(state.columns[name] % 1 == 0)) > 0.1
-    now = DAY if is_dated(state.clock_unit) else to_si(state.clock_unit, "t")
-    clocks = {state.clock_unit: 1.0}
-    if state.clock_unit != "date":
-        clocks |= {unit: factor / now for unit, factor in UNITS["s"].items() if not is_dated(unit) and factor != now}
-    costs: dict[tuple[str, float, str], float] = {}
+    costs: dict[tuple[str, float], float] = {}
     for unit, factor in UNITS["m/s"].items():
         for part in (1.0, *KNOTS) if unit == "kn" and whole else (1.0,):
-            for clock, times in clocks.items():
-                usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.odd
-                cost = (0.0 if written == unit else SETTINGS.odd + 2.0) if written else usual
-                cost += SETTINGS.usual_unit * (part != 1.0) + SETTINGS.odd * (times != 1.0)
-                off = np.log(fit.scale / (factor * part * times)) / (SETTINGS.off_unit if times == 1.0 else 0.02)
-                costs[unit, part, clock] = float(cost + off**2 / 2)
-    ranked = sorted(costs, key=costs.__getitem__)
-    unit, part, clock = ranked[0]
-    if costs[ranked[0]] > 20.0:  # a factor of no unit
+            usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.odd
+            cost = (0.0 if written == unit else SETTINGS.odd + 2.0) if written else usual
+            off = np.log(fit.scale / (factor * part)) / SETTINGS.off_unit
+            costs[unit, part] = float(cost + SETTINGS.usual_unit * (part != 1.0) + off**2 / 2)
+    best = min(costs, key=costs.__getitem__)
+    if costs[best] > 20.0:  # a factor of no unit
         return written or ("kn" if name in state.scaled else "m/s"), 1.0
-    rivals = [one for one in ranked[1:] if costs[one] <= costs[ranked[0]] + SETTINGS.close and one[2] != clock]
-    for other_unit, _, other in [ranked[0]] if clock != state.clock_unit else rivals[:1]:
-        words = f"is the clock in {other}, with {name!r} in {other_unit}? The draft says {state.clock_unit}"
-        state.ask(("t", "u", "v", "speed"), f"{words}: the track is {fit.scale:.4g} times the integral of {name!r}")
-    return unit, part
+    return best
 
 
 def _report_factor(state: State, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,6 @@ from shipid.logs.guess.clock import (
     clock_restarts,
     clock_without_repeats,
     column_called,
-    doubts_on,
     is_clock,
     other_clocks,
 )
@@ -72,14 +70,9 @@ BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one
 QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
 """How the names of x, y, z, w of a quaternion differ; numbers begin with the scalar, as in PX4 and ArduPilot."""
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
-SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
-"""Names of columns that say the ship, in small letters alone, the surest first; what they hold for an unknown one."""
-SHIP = frozenset(
-    "ship vessel shipname vesselname shipid vesselid schiff skip skib fartyg navire buque nave schip".split()
-)
-NAMES = frozenset("name id no nr num number code names navn namn nom nombre naam".split())
-"""Words of the name of a column that says a ship, and words beside them that it may have: a ship state is no ship."""
-ROWS_EACH, MOST_NUMBERS = 5, 20  # rows of each ship, on average, at least; ships that have numbers alone, at most
+SHIPS = ("mmsi", "userid", "imo", "imonumber", "callsign", "vesselname", "shipname", "vesselid", "shipid")
+UNKNOWN = ("0", "unknown")
+"""Names of columns that say the ship, in small letters alone; what they hold for an unknown one."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +82,8 @@ class LogTable:
     form, clock : keys of [format] and [clock]. t : [s], rising. notes : sentences on columns left out.
     seams : places where rows were not read, or runs begin. runs : column that says the run, and their number, where the
     clock begins again with each. sides : letters that columns beside positions hold. words : columns of words, with
-    their first. other : columns that cannot be read, and why. doubts : questions on dates. in_parts : of several.
+    their first. other : columns that cannot be read, and why. in_parts : of several.
+    doubts : questions on other clocks.
     fillers : column -> numbers that stand for no value of it.
     """
 
@@ -196,7 +190,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     notes += tuple(f"column {name!r} has numbers in {units}: write one unit" for name, units in mixed.items())
     notes += () if once.all() else ("rows that repeat the row before are left out",)
     empty = [name for name, values in columns.items() if np.isnan(values).all()]
-    doubts = (*doubts_on(table.loc[once], clock, t), *_minus_ones(columns))
     return LogTable(
         form,
         clock,
@@ -208,7 +201,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         letters | _side_columns(table, words),
         says,
         other,
-        doubts if runs else (*doubts, *other_clocks(table.loc[once], columns, clock, t)),
+        () if runs else tuple(other_clocks(table.loc[once], columns, clock, t)),
         in_parts,
         fillers,
     )
@@ -240,34 +233,17 @@ def _text_sample(file: Path, encoding: str, size: int) -> str:
 
 def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
     """Raise DataError where a log holds several ships, as a column names them: the surest of these decides."""
-    columns = [*map(str, table.columns)]
-    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed(columns)}
-    name = next((names[one] for one in SHIPS if one in names), None) or next(filter(_says_ship, columns), None)
-    if name is None:
-        return
-    texts = column_called(table, name).dropna().astype(str).str.strip()
-    known = [one for one in texts.unique() if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
-    ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]
-    if _says_ship(name) and (_are_measured(ships) or len(texts) < ROWS_EACH * len(ships)):
-        return
-    if len(ships) > 1:
-        raise DataError(
-            f"holds {len(ships)} ships ({name!r} is {', '.join(ships[:3])}{', ...' * (len(ships) > 3)}): write the "
-            "rows of each ship to a separate log, or take the column out of the log if it is one ship",
-            file=file,
-        )
-
-
-def _says_ship(name: str) -> bool:
-    """Whether the name of a column says a ship, or its name or number, and nothing else of it."""
-    parts = {*name_parts(name)}
-    return bool(parts & SHIP) and parts <= SHIP | NAMES
-
-
-def _are_measured(texts: list[str]) -> bool:
-    """Whether the texts of a column are measured: one has decimals, or all are numbers, and many."""
-    numbers = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce")
-    return bool((numbers.dropna() % 1 != 0).any() or (numbers.notna().all() and len(texts) > MOST_NUMBERS))
+    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed([*map(str, table.columns)])}
+    for name in (names[one] for one in SHIPS if one in names):
+        texts = column_called(table, name).dropna().astype(str).str.strip().unique()
+        known = [one for one in texts if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
+        ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]
+        if len(ships) > 1:
+            raise DataError(
+                f"holds {len(ships)} ships ({name!r} is {', '.join(ships[:3])}{', ...' * (len(ships) > 3)}): write the "
+                "rows of each ship to a separate log, or take the column out of the log if it is one ship",
+                file=file,
+            )
 
 
 def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:
@@ -461,20 +437,3 @@ def _is_filler(values: Array, value: float) -> bool:
     usual, many = np.abs(others), len(np.unique(others)) > LEVELS
     on_and_off = not many and np.median(usual) <= usual.max() / BEYOND
     return bool(abs(value) > (BEYOND if many else BEYOND_LEVELS) * usual.max() and not on_and_off)
-
-
-def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
-    """Yield a question for each speed, direction or shaft that is -1 and otherwise never negative, nor near it."""
-    for name, values in columns.items():
-        hit = values == -1.0
-        others = values[~hit & np.isfinite(values)]
-        if not hit.any() or len(others) < 2 or others.min() < 0.0:
-            continue
-        meant = meaning_scores(name).keys()
-        lost = bool({"speed", "V_w"} & meant and np.any(others % 1))  # whole knots may be one astern
-        lost |= bool({"psi", "course", "beta_w"} & meant and others.max() > 180.0)
-        lost |= "n" in meant and others.min() > 10.0
-        if lost:
-            span = f"{others.min():g} to {others.max():g}"
-            words = f"{name!r} is -1 in {int(hit.sum())} rows and {span} in the others"
-            yield f"{words}: is there no value? Then write missing = [-1] for it"
