@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import DataError
-from shipid.logs.amounts import is_amount
 from shipid.logs.dates import DAY_OF, TIME_OF_DAY
 from shipid.logs.foreign import foreign_format
 from shipid.logs.formats import LOOKED_AT, SheetFormat
@@ -128,7 +127,10 @@ def _text_format(
         check_width(len(line.split()) if sign == "whitespace" else line.count(sign) + 1, file)
     score, separator, decimal, mark = _guess_marks(lines, separators)
     if score < NUMERIC / 2:
-        raise DataError("no table of numbers with any separator: export it as CSV, a row for each time", file=file)
+        raise DataError(
+            "no table of numbers with any separator: export it as CSV, a row for each time, no unit behind a number",
+            file=file,
+        )
     rows = [split_cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
     places = _places_of_numbers([row for row in rows if len(row) == width], decimal, mark)
@@ -283,5 +285,5 @@ def _number_share(row: Iterable[str], decimal: str, thousands: str | None = None
     grouped = re.compile(grouped_number(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
     cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
-    known = [bool(_NUMBER.fullmatch(cell)) or is_amount(cell) or is_position(cell) for cell in cells]
+    known = [bool(_NUMBER.fullmatch(cell)) or is_position(cell) for cell in cells]
     return sum(known) / len(known) if known else 0.0

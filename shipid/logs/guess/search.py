@@ -20,7 +20,6 @@ from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.amounts import is_amount
 from shipid.logs.frames import PARALLEL, meridian_convergence
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, names_another
@@ -655,8 +654,7 @@ def _what_is_missing(state: State, position: bool) -> str:
         if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text) and not position:
             remedy = f"{name!r} holds {text[:40]!r}: write latitude and longitude in two columns"
         elif re.search(r"\d", text) and any(meaning_scores(name).get(one, 0.0) > 0.9 for one in asked):
-            other = "other units: write one unit" if is_amount(text) else "no number: write it as a number with a sign"
-            remedy = f"{name!r} holds {text[:40]!r}, {'and ' * is_amount(text)}{other}"
+            remedy = f"{name!r} holds {text[:40]!r}, no number: write it as a number with a sign, without a unit"
     for name, why in state.other.items():
         if any(meaning_scores(name).get(one, 0.0) > 0.6 for one in asked):
             remedy = f"{name!r} is {why}"

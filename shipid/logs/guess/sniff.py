@@ -13,9 +13,8 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, split_amounts
 from shipid.logs.cells import OFF_ONE, text_numbers
-from shipid.logs.formats import LOOKED_AT, TableFormat, TextFormat
+from shipid.logs.formats import TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     are_whole,
     clock_restarts,
@@ -150,7 +149,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     other: dict[str, str] = table.attrs.get("other", {})
     fillers: dict[str, list[float]] = {}
     _refuse_ships(table, file)
-    table, in_units, mixed = _without_units(table)
     decimal = form.get("decimal", ".")
     columns, words = _number_columns(table, decimal, form.get("thousands"))
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
@@ -170,7 +168,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         values[np.abs(values) > np.finfo(np.float32).max] = np.nan
     made = _degree_columns(columns) | _quaternion_columns(columns)
     made |= {name: ((source,), values) for name, (source, values) in in_text.items() if name != source}
-    in_parts = {name: parts for name, (parts, _) in made.items()} | in_units
+    in_parts = {name: parts for name, (parts, _) in made.items()}
     words = [name for name in words if name not in columns]
     lost = next(filter(is_clock, other), None)
     if lost is not None and not any(map(is_clock, map(str, table.columns))):
@@ -185,9 +183,8 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     notes += tuple(
         f"column {name!r} holds words, not numbers{_as_number(name, says[name])}"
         for name in words
-        if name and name not in {*named, *mixed}
+        if name and name not in named
     )
-    notes += tuple(f"column {name!r} has numbers in {units}: write one unit" for name, units in mixed.items())
     notes += () if once.all() else ("rows that repeat the row before are left out",)
     empty = [name for name, values in columns.items() if np.isnan(values).all()]
     return LogTable(
@@ -244,36 +241,6 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
                 "rows of each ship to a separate log, or take the column out of the log if it is one ship",
                 file=file,
             )
-
-
-def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:
-    """The table without the unit behind each number, such as 12.3 kn; it is in the name then.
-
-    Also new name -> name in the log, and column -> its units in words where it has several.
-    """
-    names, result = [*map(str, table.columns)], table.copy(deep=False)
-    renamed: dict[str, tuple[str, ...]] = {}
-    mixed: dict[str, str] = {}
-    for place, name in enumerate(names):
-        column = table.iloc[:, place]
-        other = not name or {*SIDES} & meaning_scores(name).keys() or is_clock(name)
-        if other or not (column.dtype == object or pd.api.types.is_string_dtype(column.dtype)):
-            continue
-        first = column.dropna().head(LOOKED_AT).astype(str)
-        if not first.map(lambda cell: is_amount(cell.strip())).any():
-            continue
-        bare, units = split_amounts(column.fillna("").astype(str).str.strip())
-        said = [*units[units.ne("")].value_counts().index]
-        if not any(are_one(said, unit) for unit in UNIT_WORDS):
-            mixed[name] = " and ".join(map(repr, said[:3]))
-            continue
-        result.isetitem(place, bare.to_numpy(dtype=object))
-        if not units_in_name(name):
-            north = said[0] == "M" and {"psi", "course"} & meaning_scores(name).keys()
-            names[place] = f"{name} [{'deg M' if north else said[0]}]"
-            renamed[names[place]] = (name,)
-    result.columns = pd.Index(names)
-    return result, renamed, mixed
 
 
 def _number_columns(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:
