@@ -19,7 +19,6 @@ from shipid.logs.mapping import (
     degrees_to_side,
     quaternion_size,
     quaternion_yaw,
-    rate_of_ais,
 )
 from shipid.logs.readers import in_points
 
@@ -33,12 +32,6 @@ CODES: dict[str, tuple[Callable[[Parts], Any], Callable[[Parts], Any], Callable[
         lambda parts: np.abs(parts[0]) % 100.0 >= 60.0,
         lambda parts: parts[0],
         "60 minutes or more: is the unit deg?",
-    ),
-    "ais": (
-        lambda parts: rate_of_ais(parts[0]),
-        lambda parts: np.abs(parts[0] + 0.5) > 127.5,
-        lambda parts: parts[0],
-        "none of -128 to 127, as AIS has: is the unit deg/min?",
     ),
     "deg": (
         degrees_in_parts,

@@ -21,12 +21,11 @@ from shipid.logs.guess.search import (
     Velocity,
     length_unit,
     local_plane,
-    rates_of_ais,
     search_motion,
 )
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores, unit_in_name
-from shipid.logs.mapping import UNITS, rate_of_ais, to_si
+from shipid.logs.mapping import UNITS, to_si
 from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
 
@@ -152,6 +151,7 @@ def _ask_about_names(state: State, best: MotionReading) -> None:
     """Ask about what names say of position and heading: a magnetic compass, set points, no agreement."""
     pose = best.pose
     first, second = pose.place.first, pose.place.second
+    state.ask_for_unit("psi", pose.heading, pose.unit)
     if is_magnetic(pose.heading):
         words = f"{pose.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
         state.ask(("psi", "v"), f"{words} A `heading_offset` is one for all courses")
@@ -282,14 +282,6 @@ def _take_rate(state: State, best: MotionReading) -> None:
             state.find("yaw rate does not fit", (free[0],), 0.6, words)
         return
     name, unit, fit = found.name, found.unit, found.fit
-    if unit == "ais" and (rates := rates_of_ais(state, name)) is not None:
-        missing = int(np.isnan(rate_of_ais(state.columns[name])).sum())
-        state.columns[name], state.units[name] = rates, "ais"
-        words = f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min"
-        state.find("unit of r", (name,), 0.9, words)
-        if missing:
-            words = f"{name!r} is 127, -127 or -128 in {missing} rows, with which AIS says no rate"
-            state.find("missing values", (name,), 0.95, words)
     sign = (1 if fit.scale > 0 else -1) * best.axes.hand
     confidence = 0.99 * (1 - min(0.5, fit.left))
     why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"

@@ -27,7 +27,7 @@ from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.scales import TURNS, turn_of_jumps
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores, name_parts, unit_in_name
-from shipid.logs.mapping import UNITS, rate_of_ais, to_si
+from shipid.logs.mapping import UNITS, to_si
 from shipid.physics.signals import rows_of_role
 
 Frame = Literal["ned", "enu", "zup", "ros"]
@@ -586,31 +586,17 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
         return
     called, used = state.all_called("r"), {pose.place.first, pose.place.second, pose.heading}
     for name in (name for name in state.movable("r") if name not in used):
-        for unit, values in (("", state.columns[name]), ("ais", rates_of_ais(state, name))):
-            if values is None:
-                continue
-            fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, values)))
-            scale = max(abs(fit.scale), 1e-12)
-            known = [unit] if unit else [one for one in UNITS["rad/s"] if one != "ais"]
-            unit = min(known, key=lambda one: abs(np.log(scale / UNITS["rad/s"][one])))
-            off = abs(scale / UNITS["rad/s"][unit] - 1)
-            score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
-            command = meaning_scores(name).keys() & rows_of_role("command").keys()
-            against = not score and names_another(name, "r")
-            limit = SETTINGS.named_left if score else SETTINGS.left if command or against or is_order(name) else 0.3
-            if fit.left < limit and off < (0.35 if score else SETTINGS.left):
-                cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off + SETTINGS.odd * against
-                yield Rate(name, unit, fit, float(cost))
-
-
-def rates_of_ais(state: State, name: str) -> Array | None:
-    """The rates (N,) of a column of the whole numbers of AIS, interpolated where these say none; None if it is none."""
-    coded = state.columns[name]
-    if unit_in_name(name, "rad/s") is not None or np.abs(coded).max() > 128 or np.mean(coded % 1 == 0) < 0.9:
-        return None
-    rates = rate_of_ais(coded)
-    known = np.isfinite(rates)
-    return np.interp(state.t, state.t[known], rates[known]) if known.sum() > 1 else None
+        fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])))
+        scale = max(abs(fit.scale), 1e-12)
+        unit = min(UNITS["rad/s"], key=lambda one: abs(np.log(scale / UNITS["rad/s"][one])))
+        off = abs(scale / UNITS["rad/s"][unit] - 1)
+        score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
+        command = meaning_scores(name).keys() & rows_of_role("command").keys()
+        against = not score and names_another(name, "r")
+        limit = SETTINGS.named_left if score else SETTINGS.left if command or against or is_order(name) else 0.3
+        if fit.left < limit and off < (0.35 if score else SETTINGS.left):
+            cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off + SETTINGS.odd * against
+            yield Rate(name, unit, fit, float(cost))
 
 
 # --- positions ---

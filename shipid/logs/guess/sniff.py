@@ -61,7 +61,6 @@ NOT_AVAILABLE = {
     "speed": {102.3: 51.0, 1023.0: 600.0},
     "latitude": {91.0: 90.0, 99.0: 90.0, 54_600_000.0: 54e6},
     "longitude": {181.0: 180.0, 108_600_000.0: 108e6},
-    "r": {-128.0: 127.0},
 }
 """Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
