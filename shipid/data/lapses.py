@@ -1,23 +1,23 @@
-"""Lapses: rows in which a rudder or a shaft is 0, far off or still, or a sensor is stuck, and none can have been so."""
+"""Lapses: rows in which a rudder or a shaft is 0 or far off, or a sensor is stuck, and none can have been so."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array, cumulative_integral
-from shipid.physics.signals import drive_scale, is_all_round, is_steering
+from shipid.physics.signals import is_all_round, is_steering
 
 RowMask = NDArray[np.bool_]
 Plane = NDArray[np.complex128]
 
 LONGEST_USABLE_STEP = 2.0  # s: in longer steps a rudder goes anywhere and back
-LONGEST_ZERO, LONGEST_PAUSE = 20.0, 5.0  # s: of a zero, and of one in an order
-LEAST_LOG_ROWS, LEAST_PAUSES = 50, 3  # rows of a log; zeros of an order, at least
+LONGEST_ZERO = 20.0  # s: of a zero
+LEAST_LOG_ROWS = 50  # rows of a log
 LEAST_FAULT_ANGLE, LEAST_SHARE_OF_VALUE, LEAST_SHARE_OF_RANGE = (
     np.radians(5.0),
     0.1,
@@ -32,18 +32,8 @@ NOISY_STEP_RATIO, ZERO_STEP_RATIO, SPIKE_STEP_RATIO = (
 BEYOND_RANGE = 0.1  # of the range, that a spike of 1.2 times the largest other step lies outside of it
 STEPPED_SHARE = 0.2  # share of the changes that are large, of an order, at least
 NOISY_SHARE = 0.3  # of noise: share of the rows that change, and of the changes that turn back, at least
-HELD_LENGTHS = 3  # times as long as a zero an order is held before and after it
 MOST_ZERO_ROWS, MOST_SPIKE_ROWS = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
 WIDEST_RUDDER, FASTEST_GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
-STILL_ROWS, STILL_RATIO, SHORT_REPEAT_SHARE = (
-    50,
-    10.0,
-    0.5,
-)  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
-TURN_TO_BOTH_SIDES = np.radians(
-    20.0
-)  # by which the ship turns meanwhile, to each side: to one it turns by a held helm, too
-TURN_OF_ROWS = np.radians(5.0)  # by which it turns in `STILL_ROWS` rows of another turn
 STUCK_SECONDS, STUCK_REPEATS = 4.5, 4.0  # s; times the usual repetition, at least
 MISSED_TURN, MISSED_WAY = np.radians(6.0), 0.02  # rad; share of the way: IMO MSC.96(72) allows a log 2 %
 MISSED_STEPS = 2.0  # large steps of a position
@@ -53,30 +43,27 @@ MISSED_STEPS = 2.0  # large steps of a position
 class CommandFault:
     """Rows from `first` until before `end` of a command that lapses, and how.
 
-    kind : a `pause` is a zero in an order, which somebody may have given.
     size : distance [SI] from the values before and after, at least.
     """
 
     first: int
     end: int
-    kind: Literal["zero", "pause", "spike", "still"]
+    kind: Literal["zero", "spike"]
     size: float
 
 
-def find_command_faults(name: str, t: Array, values: Array, psi: Array, follows: RowMask) -> list[CommandFault]:
+def find_command_faults(name: str, t: Array, values: Array, follows: RowMask) -> list[CommandFault]:
     """Return the rows in which a command lapses, by time.
 
-    name : of the command. t, values, psi : (N,) [s], [SI], [rad], psi without jumps.
-    follows : (N - 1,) whether nothing is missing between a row and the next.
+    name : of the command. t, values : (N,) [s], [SI]. follows : (N - 1,) whether nothing is missing between a row and
+    the next.
 
-    A zero comes and goes faster than the column moves elsewhere. In an order, which steps, zeros count from three on,
-    if they last a moment and the same order is held before and after. A spike is a row or two far from the rows before
-    and after, which agree. A value stands still where it is the same to the digit while the ship turns to both sides.
+    A zero comes and goes faster than the column moves elsewhere; in an order, which steps, it may be ordered. A spike
+    is a row or two far from the rows before and after, which agree.
     """
     if len(values) < LEAST_LOG_ROWS or not follows.any() or not np.ptp(values) > 0:
         return []
-    found = [*_zeros_and_spikes(name, t, values, follows), *_find_still_values(name, values, psi, follows)]
-    return sorted(found, key=lambda one: one.first)
+    return sorted(_zeros_and_spikes(name, t, values, follows), key=lambda one: one.first)
 
 
 def stuck_spans(
@@ -124,7 +111,7 @@ def _zeros_and_spikes(name: str, t: Array, values: Array, follows: RowMask) -> I
     changes = steps[other & (steps > 0)]
     most = float(changes.max(initial=0.0))
     if not len(changes) or np.mean(changes > least) > STEPPED_SHARE:
-        zeros = [] if is_steering(name) else _find_pauses(t, values, zeros, step)
+        zeros = []  # somebody may have ordered them
         spikes = [  # farther than all orders are apart
             one for one in spikes if one.size > np.ptp(values[kept]) and _is_beyond_range(values, one, kept, 0.0)
         ]
@@ -199,18 +186,6 @@ def _find_spikes(name: str, values: Array, follows: RowMask, least: float) -> li
     return list(found.values())
 
 
-def _find_pauses(t: Array, values: Array, zeros: list[CommandFault], step: float) -> list[CommandFault]:
-    """Zeros in orders of thrust, which step: some, of a moment each, with one order held before and after."""
-    chosen = []
-    for one in zeros:
-        rows = HELD_LENGTHS * (one.end - one.first)
-        about = np.append(values[max(one.first - rows, 0) : one.first], values[one.end : one.end + rows])
-        moment = t[one.end] - t[one.first - 1] < LONGEST_PAUSE + 1.5 * step
-        if moment and len(about) == 2 * rows and np.all(about == about[0]):
-            chosen.append(replace(one, kind="pause"))
-    return chosen if len(chosen) >= LEAST_PAUSES else []
-
-
 def _is_beyond_range(values: Array, spike: CommandFault, kept: RowMask, most: float) -> bool:
     """Whether a spike lies outside of all that is no lapse, and is larger than all other steps."""
     low, high = float(values[kept].min()), float(values[kept].max())
@@ -219,46 +194,8 @@ def _is_beyond_range(values: Array, spike: CommandFault, kept: RowMask, most: fl
     return bool(off > BEYOND_RANGE * (high - low) and spike.size > NOISY_STEP_RATIO * most)
 
 
-def _find_still_values(name: str, values: Array, psi: Array, follows: RowMask) -> Iterator[CommandFault]:
-    """Stretches of one value, to the digit, in which the ship turns, of a column that changes in other turns."""
-    edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ~follows, [True]]))
-    lengths = np.diff(edges)
-    long = lengths >= STILL_ROWS
-    if not long.any() or long.all():
-        return
-    rows = np.repeat(lengths, lengths)
-    elsewhere = rows < STILL_ROWS
-    if np.mean(elsewhere) < SHORT_REPEAT_SHARE:
-        return
-    usual = float(np.percentile(rows[elsewhere], 90))
-    turning = _turning_steps(psi) & follows & elsewhere[1:]
-    if turning.sum() < STILL_ROWS or not _is_noise(np.diff(values)[turning]):
-        return
-    ends = float(values.min()), float(values.max())
-    for first, count in zip(edges[:-1][long], lengths[long], strict=True):
-        value = float(values[first])
-        stopped = value in ends or (value == 0.0 and drive_scale(name) > 0)
-        if count > STILL_RATIO * usual and not stopped and _turns_both_ways(psi[first : first + count]):
-            yield CommandFault(int(first), int(first + count), "still", 0.0)
-
-
 def _is_noise(changes: Array) -> bool:
     """Whether changes (N,) from row to row are those of a noisy column: there are many, to and fro."""
     signs = np.sign(changes[changes != 0])
     many = len(signs) > NOISY_SHARE * len(changes) and len(signs) > 1
     return bool(many and np.mean(signs[1:] != signs[:-1]) > NOISY_SHARE)
-
-
-def _turning_steps(psi: Array) -> RowMask:
-    """Steps (N - 1,) about which the ship turns, in `STILL_ROWS` rows."""
-    reach = STILL_ROWS // 2
-    rows = np.arange(len(psi) - 1)
-    change = psi[np.minimum(rows + reach, len(psi) - 1)] - psi[np.maximum(rows - reach, 0)]
-    return np.asarray(np.abs(change) > TURN_OF_ROWS)
-
-
-def _turns_both_ways(psi: Array) -> bool:
-    """Whether the ship turns far to both sides."""
-    rise = float(np.max(psi - np.minimum.accumulate(psi)))
-    fall = float(np.max(np.maximum.accumulate(psi) - psi))
-    return bool(min(rise, fall) > TURN_TO_BOTH_SIDES)

@@ -25,18 +25,12 @@ FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a
 NOTHING = (0.0, -1.0)  # what is written for no speed and no direction
 NO_PLACE, HALF, AWAY = 0.01, 0.5, 18.0  # deg, share of a usual speed, part of a turn: rows about a fill are farther
 MOST_FILLS, BRIEF, SLOWEST_ROWS = 0.5, 20.0, 2.0  # share of the rows; s: of a speed that is a spike; from row to row
-SURE, UNSURE = 0.9, 0.6  # that it is no value: of what is unsure the repair is drafted switched off
+SURE = 0.9  # that it is no value
 FAULTS = {
-    "zero": ("lapses of a command", SURE, "is 0 {}: faster than it moves elsewhere."),
-    "spike": ("lapses of a command", SURE, "leaves its course {} and comes back: faster than it moves elsewhere."),
-    "pause": ("lapses of a command", UNSURE, "is 0 {} with the same order before and after. Was that ordered?"),
-    "still": (
-        "frozen sensor",
-        UNSURE,
-        "repeats one value {} while the ship turns to both sides, and is noisy in other turns. Was it ordered so?",
-    ),
+    "zero": ("lapses of a command", "is 0 {}: faster than it moves elsewhere."),
+    "spike": ("lapses of a command", "leaves its course {} and comes back: faster than it moves elsewhere."),
 }
-"""Kind of a fault -> the kind of its finding, how sure it is, and what is seen."""
+"""Kind of a fault -> the kind of its finding, and what is seen."""
 Spans = Sequence[tuple[int, int]] | NDArray[np.intp]
 """First row of each stretch, and the row after its last."""
 
@@ -83,7 +77,7 @@ def take_fills(state: State) -> None:
         if name in (*places, *courses) or max(b - a for a, b in spans) > (BRIEF / step if name in speeds else 2):
             kind, why = ("no fix", "the receiver had no fix") if place else ("zeros", "it was written for no value")
             said = f"is {' or '.join(f'{one:g}' for one in fills)} {{}}, far from the rows about: {why}."
-            _report(state, (kind, SURE, said), name, t, spans, ("u", "v", "psi", "speed", "course", *POSITIONS))
+            _report(state, (kind, said), name, t, spans, ("u", "v", "psi", "speed", "course", *POSITIONS))
         else:
             before, least = state.spikes.get(name, (np.flatnonzero(rows), np.inf))
             state.spikes[name] = np.union1d(np.flatnonzero(rows), before), min(least, float(size.min()))
@@ -97,7 +91,7 @@ def report_command_faults(state: State, sniffed: LogTable) -> None:
         t, values = state.t[known], raw[known] * to_si(one.unit, one.name) * one.extra.get("factor", 1.0)
         values = np.unwrap(values) if one.extra.get("wrap") else values
         follows = np.diff(t) <= evidence.GAP * np.median(np.diff(t)) if len(t) > 1 else np.zeros(0, dtype=bool)
-        found = find_command_faults(one.name, t, values, state.psi[known], follows)
+        found = find_command_faults(one.name, t, values, follows)
         for kind in dict.fromkeys(fault.kind for fault in found):
             spans = [(fault.first, fault.end) for fault in found if fault.kind == kind]
             _report(state, FAULTS[kind], one.source, t, spans, (one.name,))
@@ -112,7 +106,7 @@ def report_stuck_sensors(state: State) -> None:
         spans = stuck_spans(one.name, t, state.columns[one.source], (state.psi, state.position), rates, follows)
         if spans:  # a jump that follows may be taken for one across 360
             rows = [(first + 1, min(last + 2, len(t))) for first, last in spans]
-            fault = "frozen sensor", SURE, "repeats one value while the ship moves otherwise {}."
+            fault = "frozen sensor", "repeats one value while the ship moves otherwise {}."
             _report(state, fault, one.source, t, rows, (one.name,))
 
 
@@ -135,19 +129,16 @@ def report_spikes(state: State) -> None:
         state.find("spikes", (one.source,), SURE, sentence, repair | {"threshold": float(f"{size / 2:.2g}")})
 
 
-def _report(
-    state: State, fault: tuple[str, float, str], name: str, t: Array, spans: Spans, about: tuple[str, ...]
-) -> None:
+def _report(state: State, fault: tuple[str, str], name: str, t: Array, spans: Spans, about: tuple[str, ...]) -> None:
     """Report rows at t (N,) [s] of a column that hold no value; the repair breaks the run there.
 
-    It is asked where that is not sure, and of rows of several files, which have no clock in common.
+    It is asked of rows of several files, which have no clock in common.
     """
-    kind, sure, words = fault
+    kind, words = fault
     sentence = f"{name!r} {words.format(places_in_words(state, t, spans))}"
-    if state.joined or sure == UNSURE:
-        remedy = "leave these cells empty, and draft again" if state.joined else "switch the repair on"
-        state.ask(about, f"{sentence} Unless it was so, {remedy}")
-    state.find(kind, (name,), sure, sentence, break_repair(state, t, spans))
+    if state.joined:
+        state.ask(about, f"{sentence} Unless it was so, leave these cells empty, and draft again")
+    state.find(kind, (name,), SURE, sentence, break_repair(state, t, spans))
 
 
 def break_repair(state: State, t: Array, spans: Spans) -> dict[str, Any] | None:

@@ -37,11 +37,9 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import (
     LONGEST_LINE,
     READERS,
-    has_nul,
     in_points,
     parse_text,
     read_log_table,
-    refuse_power_cut,
     require_file,
 )
 
@@ -125,8 +123,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         form, lines, notes = format_of_sheet(file, names)
     model = READERS[form.get("kind", "text")].options.model_validate(form)
     if isinstance(model, TextFormat):
-        if has_nul(head, model):
-            refuse_power_cut(head, file)
         sampled = size > SAMPLE
         lines = _text_sample(file, model.encoding, size)
     if isinstance(model, TableFormat):

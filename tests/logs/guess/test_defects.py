@@ -51,13 +51,6 @@ def moved(frame: pd.DataFrame, x: float, y: float) -> pd.DataFrame:
     return frame.assign(N=frame["N"] + x * c - y * s, E=frame["E"] + x * s + y * c)
 
 
-def turned(frame: pd.DataFrame, angle: float) -> pd.DataFrame:
-    """The heading reads `angle` [deg] low; the velocities are along the wrong heading."""
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    u, v = c * frame["u"] - s * frame["v"], s * frame["u"] + c * frame["v"]
-    return frame.assign(psi=(frame["psi"] - angle) % 360.0, u=u, v=v)
-
-
 DEFECTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
     "holes in time": (lambda frame: frame.drop(range(500, 540)), r"1 steps are more than 3 times"),
     "missing values": (lambda frame: frame.assign(u=frame["u"].where(frame.index % 50 != 7)), r"no value in 'u'"),
@@ -84,12 +77,6 @@ def test_a_defect_is_reported_with_its_size(kind: str, tmp_path: Path) -> None:
     findings = {finding.kind: finding for finding in result.findings}
     assert kind in findings, sorted(findings)
     assert re.search(sentence, findings[kind].sentence), findings[kind].sentence
-
-
-def in_a_current(frame: pd.DataFrame, north: float, east: float) -> pd.DataFrame:
-    c, s = np.cos(np.radians(frame["psi"])), np.sin(np.radians(frame["psi"]))
-    moved = {"N": frame["N"] + north * frame["time"], "E": frame["E"] + east * frame["time"]}
-    return frame.assign(**moved, u=frame["u"] + c * north + s * east, v=frame["v"] + c * east - s * north)
 
 
 @pytest.mark.parametrize("delay", [-2.5, 2.5])

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from shipid.logs.guess.columns import guess
-from shipid.logs.importing import read_mapping
 from tests.drawn import seeds
 from tests.logs.simulated import as_bridge, globe, guess_of, import_draft, si_log
 
@@ -31,26 +30,6 @@ def test_lapses_of_commands_are_drafted_and_mended(tmp_path: Path) -> None:
     shaft = next(one.name for one in proposal.columns if one.source == "rpm")
     truth = np.interp(mended.frame["t"], log["t"], log["n"])
     assert mended.frame[shaft].to_numpy() == pytest.approx(truth, abs=0.05)
-
-
-def test_what_may_be_an_order_is_asked_and_stays_as_it_is(tmp_path: Path) -> None:
-    """Zeros between equal orders, and a rudder that stands still through a zigzag."""
-    frame = globe(1)
-    order = np.where(np.arange(len(frame)) < 1500, 100.0, 120.0)
-    for place in (300, 1200, 2000):
-        order[place : place + 3] = 0.0
-    frame["rpm"] = order
-    proposal = guess_of(tmp_path, frame)
-    (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
-    assert found.columns == ("rpm",)
-    words = "Was that ordered? Unless it was so, switch the repair on"
-    asked = [one.sentence for one in proposal.questions if words in one.sentence]
-    assert len(asked) == 1
-    assert "'rpm' is 0 in 9 rows at 3 places" in asked[0]
-    dataset = import_draft(tmp_path, proposal)
-    mapping = read_mapping(tmp_path / "draft.toml")
-    assert not any(repair.enabled for repair in mapping.repair if repair.kind in ("break", "despike"))
-    assert len(dataset.frame) == len(frame)
 
 
 def test_lapses_in_files_of_a_folder_are_asked(tmp_path: Path) -> None:
