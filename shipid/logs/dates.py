@@ -79,7 +79,7 @@ def parse_dates(dates: pd.Series[Any]) -> Array:
         of_day = np.where(half.isna(), since, since % HALF_DAY + HALF_DAY * half.eq("pm"))  # 12 AM is midnight
         alone = found[0].isna()
         of_one = over_midnights(np.where(alone, of_day, np.nan))
-        since = of_one if alone.mean() > 0.5 else day_readings(found[0])[0] + of_day
+        since = of_one if alone.mean() > 0.5 else read_days(found[0]) + of_day
     else:
         zoned = texts.str.contains(ZONE)
         since = _since_1970(texts.where(zoned | (not zoned.any())))
@@ -91,10 +91,10 @@ def are_in_one_number(values: Array) -> bool:
     return bool(len(values) and np.all((values > 1.9e13) & (values < 2.1e13)))
 
 
-def day_readings(days: pd.Series[Any]) -> list[Array]:
-    """Dates (N,) of text as seconds since 1970, NaN for none, in each way that reads most of them.
+def read_days(days: pd.Series[Any]) -> Array:
+    """Dates (N,) of text as seconds since 1970, NaN for none, in the way that reads most of them.
 
-    Of several those with which the log is shortest, day/month first; one of NaN alone where no way reads them.
+    Of several that with which the log is shortest, day/month first; NaN alone where no way reads most.
     """
     places, known = pd.factorize(days)
     texts = pd.Series(known, dtype="str").str.replace(r"[/ :_]+", "-", regex=True)
@@ -102,10 +102,11 @@ def day_readings(days: pd.Series[Any]) -> list[Array]:
     moments = (pd.Series(pd.to_datetime(texts, format=way, utc=True, errors="coerce")) for way in DAYS)
     read = (np.append(_since_1970(one), np.nan)[places] for one in moments)
     readings = [one for one in read if np.isfinite(one).sum() > 0.5 * len(one)]
-    sizes = [(int(np.isnan(one).sum()), float(np.nanmax(one) - np.nanmin(one))) for one in readings]
-    return [one for one, size in zip(readings, sizes, strict=True) if size == min(sizes)] or [
-        np.full(len(days), np.nan)
-    ]
+    return min(
+        readings,
+        key=lambda one: (int(np.isnan(one).sum()), np.ptp(one[np.isfinite(one)])),
+        default=np.full(len(days), np.nan),
+    )
 
 
 def format_date(moment: float) -> str:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.dates import date_texts, day_readings, format_date, format_moment, format_span, parse_dates, time_texts
+from shipid.logs.dates import date_texts, format_date, format_moment, format_span, parse_dates, read_days, time_texts
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.conftest import T, import_written, mapping_with
@@ -146,10 +146,10 @@ def test_dates_in_columns_of_numbers() -> None:
     year, month, day = [2024.0, 24.0, 68.0, 69.0, 2024.0, 2024.0, 2024.0, 2024.0], [12.0] * 8, [31.0] * 8
     month[4], day[5], day[6], year[7] = 13.0, 32.0, 1.5, np.nan
     texts = date_texts([np.array(one) for one in (year, month, day)])
-    (days,) = day_readings(pd.concat([texts.iloc[:4], texts]))  # most of them can be read
+    days = read_days(pd.concat([texts.iloc[:4], texts]))  # most of them can be read
     moments = [*["2024-12-31", "2024-12-31", "2068-12-31", "1969-12-31"] * 2, None, None, None, None]
     np.testing.assert_array_equal(days, (pd.to_datetime(moments) - pd.Timestamp(0)).total_seconds())
-    (of_year,) = day_readings(date_texts([np.array([2024.0, 2024.0, 2024.0]), np.array([1.0, 366.0, 367.0])]))
+    of_year = read_days(date_texts([np.array([2024.0, 2024.0, 2024.0]), np.array([1.0, 366.0, 367.0])]))
     np.testing.assert_array_equal(of_year, [1704067200.0, 1735603200.0, np.nan])
 
 

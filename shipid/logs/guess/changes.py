@@ -102,10 +102,10 @@ def _other_readings(state: State, parts: list[Windows], middle: NDArray[np.intp]
         (("psi", "north", "east", "latitude", "longitude"), own, "has it, or have the axes, another unit or sense"),
         (("psi", "course", "u", "v", "r"), every, "are they exchanged"),
     ):
-        usual = min(kinds, key=lambda one: float(np.median(kinds[one])))
+        usual = min(kinds, key=lambda one: float(np.median(kinds[one])), default="")
         best = [min(kinds, key=lambda one: kinds[one][place]) for place in range(len(sure))]
         least = np.array([kinds[one][place] for place, one in enumerate(best)])
-        odd = np.flatnonzero((kinds[usual] > CLEAR * least + APART) & (least < SETTINGS.poor))
+        odd = np.flatnonzero((kinds.get(usual, least) > CLEAR * least + APART) & (least < SETTINGS.poor))
         if len(odd):
             words = (
                 f"{{}} the track keeps to {best[odd[0]]}, elsewhere to {usual}: {remedy} there? Then import it alone"
