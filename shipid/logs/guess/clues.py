@@ -141,7 +141,6 @@ class State:
     another. sides : letters that columns beside positions hold. negated : columns whose sign is turned.
     words : columns of words, with their first. other : columns that cannot be read, and why.
     commands : of the vessel, where it is known. turning : column that steers -> sign that turns the ship to starboard.
-    astern : whether the ship goes astern nearly always.
     position, psi : north + i east [m], heading [rad]; from `choose_pose` on. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -164,7 +163,6 @@ class State:
     questions: list[Question] = field(default_factory=list)
     commands: tuple[str, ...] = ()
     turning: dict[str, float] = field(default_factory=dict)
-    astern: bool = False
     position: Complex = field(init=False)
     psi: Array = field(init=False)
     r: Array | None = None

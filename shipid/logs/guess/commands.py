@@ -114,19 +114,13 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
     extra: dict[str, Any] = {"wrap": True} if turned else {}
     effect = state.effect(r, state.columns[name])
     top = float(np.abs(state.columns[name]).max())
-    astern = state.astern and signal == "delta"
     confidence = 0.5 if sure else 0.4
     why = "by its name; it is not seen to turn the ship, so that its sign is not known"
     seen = abs(effect) > SETTINGS.seen
     if seen:
-        effect = -effect if astern else effect
         state.turning[name] = float(np.sign(effect))
         sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
-        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} (t value {abs(effect):.0f}"
-        why += ", the other way astern)" if state.astern else ")"
-        if astern:
-            words = f"the ship goes astern, and a rudder is taken to turn it the other way there: is {name!r}"
-            state.ask((signal,), f"{words} positive to {sides[0]}?")
+        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} (t value {abs(effect):.0f})"
     share = _ask_for_share(state, name, signal, unit)
     unsided = signal == "delta" and not turned and not share and _is_unsided(state, name, r)
     if unsided:
@@ -187,7 +181,7 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
 def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
     """Ask where an azimuth angle is about half a turn while the ship goes ahead: it may say where the water goes."""
     turn = to_si(unit, "x.alpha")
-    astern = state.astern or any(np.mean(state.columns[one] < 0) > 0.5 for one in state.called("n"))
+    astern = any(np.mean(state.columns[one] < 0) > 0.5 for one in state.called("n"))
     if not astern and np.mean(np.cos(turn * state.columns[name])) <= -0.5:
         words = f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
         half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"

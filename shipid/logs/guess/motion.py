@@ -98,11 +98,7 @@ def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], se
     """Note axes and a heading that count otherwise than usual, and ask where another reading is nearly as likely."""
     pose, axes = best.pose, best.axes
     agreement = 1.0 - pose.misfit
-    if pose.astern:
-        state.astern = True
-        said = "course and heading differ by about 180 deg: the ship goes astern, as shafts or velocities say"
-        state.find("astern", (pose.heading,), 0.8, said)
-    elif sense.quarter == 2 and sense.sign > 0:
+    if sense.quarter == 2 and sense.sign > 0:
         said = f"does the ship go astern, or has {pose.heading!r} another zero? If it goes astern, take the offset out"
         state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {said}")
     if (axes != Axes() or sense != Sense()) and not best.settled.startswith("--"):

@@ -106,7 +106,7 @@ class Place:
 class Pose:
     """A hypothesis of position and heading: a whole `turn` of the heading in its unit, its sense in the plane.
 
-    misfit : 1 - mean cosine of the angle between track and heading. astern : the heading points against the track.
+    misfit : 1 - mean cosine of the angle between track and heading.
     """
 
     place: Place
@@ -115,7 +115,6 @@ class Pose:
     sense: Sense
     misfit: float
     cost: float
-    astern: bool = False
 
     @property
     def unit(self) -> str:
@@ -187,7 +186,6 @@ def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[
     if not poses or (poses[0].misfit > SETTINGS.poor and not (places and headings)):
         raise DataError(_what_is_missing(state, bool(places)), file=file)
     kept = [one for one in poses if one.cost < poses[0].cost + 6.0][: SETTINGS.beam]
-    kept += [_as_astern(state, one) for one in kept if one.misfit < SETTINGS.named_left]
     motions = [motion for pose in kept if (motion := _motion_of_pose(state, pose, frame)) is not None]
     if not motions:
         best = poses[0]
@@ -330,14 +328,6 @@ def _angle(state: State, name: str, turn: float) -> Array:
 
 def _plane_heading(state: State, pose: Pose) -> Array:
     return pose.sense.direction(_angle(state, pose.heading, pose.turn))
-
-
-def _as_astern(state: State, pose: Pose) -> Pose:
-    """The same of a ship that goes astern all the time: its heading points against the track."""
-    shafts = [state.columns[name][state.columns[name] != 0.0] for name in state.called("n")]
-    back = any(len(one) and np.mean(one < 0.0) > SETTINGS.astern for one in shafts)
-    sense = Sense(pose.sense.sign, (pose.sense.quarter + 3) % 4 - 1)
-    return replace(pose, sense=sense, astern=True, cost=pose.cost + (1.0 if back else SETTINGS.rare))
 
 
 def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> MotionReading | None:
@@ -499,7 +489,7 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
             unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
             if against and by_track > -SETTINGS.alike_left:
                 continue  # the second says nothing of the track
-        elif one.kind == "course" and drift > 0.5 and not pose.astern:
+        elif one.kind == "course" and drift > 0.5:
             ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
             unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left
         yield replace(one, fit=fit, cost=cost, unsure=unsure)
