@@ -18,7 +18,6 @@ from shipid.units import percent_text
 
 FARTHEST = 1e5  # m between origins
 COPIED = 0.3  # share of the rows of a run from which on it is a copy: manoeuvres of a simulator may begin alike
-PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from no common moment
 
 
 def join_datasets(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
@@ -37,7 +36,7 @@ def join_datasets(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]
     notes: list[str] = []
     columns = _common_columns(datasets, notes)
     names = _joined_names(datasets, notes)
-    clock, delays = _common_clock(datasets, notes)
+    clock = _common_clock(datasets, notes)
     flags = list(dict.fromkeys(name for one in datasets.values() for name in one.metadata.get("flags", [])))
     frames = []
     for file, one in datasets.items():
@@ -45,7 +44,7 @@ def join_datasets(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]
         frame = one.frame[columns].assign(run=one.frame["run"].map(names[file]), flags=_joined_flags(one, flags))
         place = (frame["north"] + 1j * frame["east"]).to_numpy() * np.exp(1j * turn)
         turned = {name: frame[name] + turn for name in ("psi", "beta_w") if name in frame}
-        frame = frame.assign(north=place.real + north, east=place.imag + east, t=frame["t"] + delays[file], **turned)
+        frame = frame.assign(north=place.real + north, east=place.imag + east, **turned)
         frames.append(frame.astype({"run": "str"}))
         if np.hypot(north, east) > 0:
             angle = f", and turned with all directions by {np.degrees(turn):+.2f} deg" if abs(turn) > PARALLEL else ""
@@ -112,28 +111,20 @@ def _joined_names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Pa
     return {file: {run: next(distinct) for run in one.runs} for file, one in datasets.items()}
 
 
-def _common_clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dict[Path, float]]:
-    """Clock of the whole, and what is added to the times of each file [s]."""
-    delays = dict.fromkeys(datasets, 0.0)
-    if any(one.metadata.get("clock", "shared") == "run" for one in datasets.values()):
-        for file, one in datasets.items():
-            if one.metadata.get("clock", "shared") != "run":
-                _check_no_overlap(file, one)
-        return "run", delays
+def _common_clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> str:
+    """Clock of the whole: that of each run where one has it, or where undated recordings overlap."""
     spans = {file: (float(one.frame["t"].min()), float(one.frame["t"].max())) for file, one in datasets.items()}
-    with_date = {file: begin > FIRST_DATED_TIME for file, (begin, _) in spans.items()}
-    dated = all(with_date.values())
-    if any(with_date.values()) and not dated:
-        file = next(file for file, here in with_date.items() if not here)
-        raise DataError("its clock has no date, that of another has: map the column of dates in both", file=file)
-    if dated or not any(a <= d and c <= b for (a, b), (c, d) in combinations(spans.values(), 2)):
-        return "shared", delays
-    end = -np.inf
-    for file, (begin, last) in spans.items():
-        delays[file] = max(0.0, float(np.ceil(end + PAUSE - begin))) if np.isfinite(end) else 0.0
-        end = last + delays[file]
-    notes.append("clocks overlap and have no date: each recording is put after the one before it")
-    return "shared", delays
+    if all(one.metadata.get("clock", "shared") != "run" for one in datasets.values()):
+        bare = [file for file, (begin, _) in spans.items() if begin <= FIRST_DATED_TIME]
+        if 0 < len(bare) < len(datasets):
+            raise DataError("its clock has no date, that of another has: map the column of dates in both", file=bare[0])
+        if not bare or not any(a <= d and c <= b for (a, b), (c, d) in combinations(spans.values(), 2)):
+            return "shared"
+        notes.append("clocks overlap and have no date: each run has a clock of its own")
+    for file, one in datasets.items():
+        if one.metadata.get("clock", "shared") != "run":
+            _check_no_overlap(file, one)
+    return "run"
 
 
 def _check_no_overlap(file: Path, one: Dataset) -> None:

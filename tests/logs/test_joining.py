@@ -12,7 +12,7 @@ import pytest
 from shipid.data.dataset import BREAK, Dataset, read_dataset, stretches_of_runs, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
-from shipid.logs.joining import PAUSE, join_datasets
+from shipid.logs.joining import join_datasets
 from tests.cli.running import ended, output_of
 from tests.drawn import seeds
 
@@ -93,10 +93,9 @@ def test_positions_have_the_first_origin() -> None:
         joined(recording(1, origin=ORIGIN), recording(2, ("c",), begin=900.0))
 
 
-def test_clocks_that_overlap_follow_each_other_unless_they_have_dates() -> None:
+def test_clocks_that_overlap_are_those_of_runs_unless_they_have_dates() -> None:
     whole, notes = joined(recording(1), recording(2, ("c",)))
-    spans = whole.frame.groupby("run", sort=False)["t"].agg(["min", "max"])
-    assert spans.loc["c", "min"] >= spans.loc["b", "max"] + PAUSE
+    assert whole.metadata["clock"] == "run"
     assert "clocks overlap" in notes[0]
     dated = [recording(seed, runs, begin=1.7e9) for seed, runs in ((1, ("a",)), (2, ("c",)))]
     assert joined(*dated)[1] == [], "two recorders of one hour: windows of one moment stay apart from each other"
