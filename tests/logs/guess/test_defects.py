@@ -161,10 +161,11 @@ def test_what_was_not_looked_at_is_no_hole(tmp_path: Path, monkeypatch: pytest.M
     assert "holes in time" in guess_of(tmp_path, with_a_hole).kinds
 
 
-def test_a_speed_of_0_far_from_the_others_is_no_speed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("nothing", [0.0, -1.0])
+def test_a_speed_of_0_far_from_the_others_is_no_speed(nothing: float, tmp_path: Path) -> None:
     """Before, one speed in twenty-five that was 0 was drafted as a factor of 1.04."""
     drawn = np.random.default_rng(0).random(len(CLEAN)) < 0.04
-    lost = {name: CLEAN[name].mask(drawn, 0.0) for name in ("u",)}
+    lost = {name: CLEAN[name].mask(drawn, nothing) for name in ("u",)}
     proposal = guess_of(tmp_path, CLEAN.assign(**lost))
     assert proposal.kinds == {"spikes"}
     assert import_draft(tmp_path, proposal).frame["u"].to_numpy() == pytest.approx(CLEAN["u"], abs=0.1)
