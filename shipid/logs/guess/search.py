@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
@@ -472,11 +473,15 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
     """Yield pairs of columns whose integral is the track: velocities of the Earth or of the ship, speed and course."""
     turn, used = np.exp(1j * theta), {pose.place.first, pose.place.second, pose.heading}
     plain = {*state.eligible(*VELOCITIES)}  # no word of their names says another quantity
+    steady = {
+        kind: _left_by_constant(state, seen, way) for kind, way in (("earth", np.ones_like(turn)), ("body", turn))
+    }
     for one in [*_pairs_of_velocities(state, used, seen, turn), *_speeds_and_courses(state, used, seen)]:
         fit = _fit_of_path(state, seen, one.ground)
         sure, usual = one.named >= (0.75 if one.kind == "course" else 0.45), _is_speed_unit(fit.scale)
         against = one.kind != "course" and not {one.first, one.second} <= plain
-        if fit.scale <= 0 or not (sure or usual) or fit.left > (SETTINGS.named_left if sure else SETTINGS.left):
+        limit = SETTINGS.left * steady[one.kind] if against else SETTINGS.named_left if sure else SETTINGS.left
+        if fit.scale <= 0 or not (sure or usual) or fit.left > limit:
             continue
         cost = one.cost + float(np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + one.named))) + (not usual)
         cost += SETTINGS.odd * against
@@ -493,6 +498,12 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
             ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
             unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left
         yield replace(one, fit=fit, cost=cost, unsure=unsure)
+
+
+def _left_by_constant(state: State, seen: Complex, way: NDArray[np.generic]) -> float:
+    """Share of a motion (W,) that a constant velocity or rate along a way (N,) leaves, as any still column is one."""
+    ran = state.chosen.change(evidence.integrate_rate(state.t, way))
+    return 1.0 - abs(np.vdot(ran, seen)) ** 2 / max(float(np.vdot(ran, ran).real * np.vdot(seen, seen).real), 1e-300)
 
 
 def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
@@ -574,6 +585,7 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
     change = state.chosen.change(theta)
     if float(np.std(change)) < np.radians(0.5):
         return
+    steady = _left_by_constant(state, change, np.ones(len(state.t)))
     called, used = state.all_called("r"), {pose.place.first, pose.place.second, pose.heading}
     for name in (name for name in state.movable("r") if name not in used):
         fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])))
@@ -583,7 +595,8 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
         score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
         command = meaning_scores(name).keys() & rows_of_role("command").keys()
         against = not score and names_another(name, "r")
-        limit = SETTINGS.named_left if score else SETTINGS.left if command or against or is_order(name) else 0.3
+        limit = SETTINGS.named_left if score else SETTINGS.left if command or is_order(name) else 0.3
+        limit = SETTINGS.left * steady if against else limit
         if fit.left < limit and off < (0.35 if score else SETTINGS.left):
             cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off + SETTINGS.odd * against
             yield Rate(name, unit, fit, float(cost))
