@@ -1,13 +1,9 @@
-"""Units as logs write them, and numbers with their unit behind them in a cell: 12.3 kn, 308.21 T, 45.2°."""
+"""Units as logs write them in the names of columns."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from functools import cache
-from typing import Any
-
-import pandas as pd
 
 UNIT_WORDS = {
     "kn": r"kn|kts?|knots?|[节節]|ノット|노트|узл?ов|уз",
@@ -41,27 +37,8 @@ PREFIXED = ("deg", "rad", "deg/s", "deg/min", "rad/s", "rpm")
 """Units of which logs write parts or multiples with a prefix, as in mrad."""
 _PREFIXES = {"kilo": 1e3, "k": 1e3, "deci": 0.1, "d": 0.1, "centi": 0.01, "c": 0.01, "milli": 1e-3, "m": 1e-3}
 _PREFIX = re.compile(r"(kilo|deci|centi|milli|[kdcm])([a-z].*)")
-_AMOUNT = re.compile(r"([+-]?\d[\d.,'’ \u00a0\u202f]*?(?:[eE][+-]?\d+)?)\s*([^\d\s.,'’+-].{0,14}?)\s*")
 _NORTH = re.compile(r"(?:°|deg)? ?(t|m|true|mag)")
 """Behind an angle: of true, or of magnetic north."""
-
-
-def split_amounts(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
-    """The numbers (N,) of texts such as 12.3 kn, as text, and their units; each other text with no unit."""
-    found = texts.str.extract(rf"^(?:{_AMOUNT.pattern})$")
-    units = found[1].map(lambda unit: _as_written(unit) if isinstance(unit, str) else "").astype(object)
-    return found[0].where(units.ne(""), texts), units
-
-
-@cache
-def _as_written(text: str) -> str:
-    """A unit as a name would have it in brackets; empty where it is none."""
-    north = north_reference(text)
-    if north == "T" or (north and len(text) > 1):  # m alone is metres
-        return f"deg {north}"
-    if text in ("N", "n"):  # of a latitude
-        return ""
-    return text if is_known(text) else ""
 
 
 @cache
@@ -82,22 +59,3 @@ def north_reference(text: str) -> str:
     """Return T or M for a text behind an angle that says true or magnetic north; empty for any other one."""
     found = _NORTH.fullmatch(text.lower())
     return found[1][0].upper() if found else ""
-
-
-def is_unit(text: str, unit: str) -> bool:
-    """Whether a text behind a number says a unit of a mapping."""
-    known = {"Nm": "N m", "kNm": "kN m"}.get(unit, unit)
-    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (
-        unit == "deg" and north_reference(text) != ""
-    )
-
-
-def are_one(texts: Iterable[str], unit: str) -> bool:
-    """Whether all texts behind the numbers of a column say the same unit, and not two kinds of north."""
-    return all(is_unit(text, unit) for text in texts) and len({*map(north_reference, texts)} - {""}) < 2
-
-
-def is_amount(cell: str) -> bool:
-    """Whether a cell is a number with a unit behind it."""
-    found = _AMOUNT.fullmatch(cell)
-    return found is not None and _as_written(found[2]) != ""

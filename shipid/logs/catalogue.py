@@ -35,15 +35,9 @@ def fetch_log(name: str) -> Path:
                 path="source.sha256",
             )
         return file
-    if source.url is None or source.sha256 is None:
+    if source.url is None or source.sha256 is None or source.runs is not None:
         raise DataError(
-            f"nothing to download: give the log itself, or set {FOLDER_VARIABLE} to a folder that holds it",
-            file=name,
-            path="source.url",
-        )
-    if source.runs is not None:
-        raise DataError(
-            f"several files, not downloaded: get them from {source.url} and set {FOLDER_VARIABLE} to their folder",
+            f"not downloaded: give the log itself, or set {FOLDER_VARIABLE} to a folder that holds it ({source.url})",
             file=name,
             path="source.url",
         )

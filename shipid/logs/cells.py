@@ -11,7 +11,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, suggest_name
-from shipid.logs.amounts import is_unit, north_reference, split_amounts
 from shipid.logs.formats import Format, TableFormat, TextFormat
 from shipid.logs.mapping import (
     OF_SHIP,
@@ -20,7 +19,6 @@ from shipid.logs.mapping import (
     degrees_to_side,
     quaternion_size,
     quaternion_yaw,
-    rate_of_ais,
 )
 from shipid.logs.readers import in_points
 
@@ -34,12 +32,6 @@ CODES: dict[str, tuple[Callable[[Parts], Any], Callable[[Parts], Any], Callable[
         lambda parts: np.abs(parts[0]) % 100.0 >= 60.0,
         lambda parts: parts[0],
         "60 minutes or more: is the unit deg?",
-    ),
-    "ais": (
-        lambda parts: rate_of_ais(parts[0]),
-        lambda parts: np.abs(parts[0] + 0.5) > 127.5,
-        lambda parts: parts[0],
-        "none of -128 to 127, as AIS has: is the unit deg/min?",
     ),
     "deg": (
         degrees_in_parts,
@@ -104,11 +96,11 @@ def log_column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Seri
 
 
 def parse_numbers(
-    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = "", units: tuple[str, ...] = ()
+    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = ""
 ) -> NDArray[np.float64]:
     """Turn a column into numbers, NaN where missing; text that is no number raises with its row.
 
-    sides : letters of an angle in degrees, such as 59°26'12.3"N. units : of which one may stand behind every number.
+    sides : letters of an angle in degrees, such as 59°26'12.3"N.
     """
     column = log_column(log, source, file, path)
     numeric = pd.api.types.is_numeric_dtype(column.dtype)
@@ -136,24 +128,6 @@ def parse_numbers(
             )
     missing = text.isin(read.missing)
     numbers = text_numbers(text.mask(missing), read.decimal, read.thousands)
-    if units and np.any(~np.isfinite(numbers) & ~missing):
-        bare, behind = split_amounts(text)
-        own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).astype(bool)
-        refuse(
-            behind.ne("") & ~own & ~missing & (not sides),
-            f"is not in {units[0]}, as the mapping has it",
-            ": write one unit in the whole column",
-        )
-        north = behind.where(own, "").map(north_reference)
-        first = next(filter(None, north), "")
-        refuse(
-            north.ne("") & north.ne(first),
-            f"is not of {'true' if first == 'T' else 'magnetic'} north, as those before it",
-            ": write one north in the whole column",
-        )
-        text = bare.where(own, text)
-        missing |= text.isin(read.missing)
-        numbers = text_numbers(text.mask(missing), read.decimal, read.thousands)
     if sides and np.any(~np.isfinite(numbers) & ~missing):
         words = in_points(text, read.decimal, None).mask(missing)
         angles = degrees_to_side(words, sides)

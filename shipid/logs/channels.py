@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import BREAK, clock_slack
 from shipid.errors import DataError
 from shipid.logs.cells import row_in_words
-from shipid.logs.dates import format_moment, rollover_words
+from shipid.logs.dates import format_moment
 from shipid.logs.frames import TURN, is_turn
 from shipid.logs.mapping import Column
 from shipid.logs.repairs import FLAGS, Records, interpolate_missing
@@ -37,7 +37,7 @@ def common_instants(
     first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
     slack = clock_slack(t)
     if step is not None:
-        t = instants_at_step(first, last + slack, step, [*spans.values()], file, "clock.step")
+        t = _instants_at_step(first, last + slack, step, [*spans.values()], file)
     shared: NDArray[np.float64] = t[(t >= first - slack) & (t <= last + slack)]
     if len(shared) < 2:
         late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))
@@ -50,8 +50,8 @@ def common_instants(
     return shared
 
 
-def instants_at_step(
-    first: float, last: float, step: float, times: list[NDArray[np.float64]], file: Path, path: str
+def _instants_at_step(
+    first: float, last: float, step: float, times: list[NDArray[np.float64]], file: Path
 ) -> NDArray[np.float64]:
     """The instants `step` [s] apart from first to last; none where it is before first.
 
@@ -61,12 +61,11 @@ def instants_at_step(
     if count > MANY and count > FAR_MORE * len(samples := np.unique(np.concatenate(times))):
         row = int(np.argmax(np.diff(samples)))
         before, after = (format_moment(samples[row + one]) for one in (0, 1))
-        after += rollover_words(samples[row + 1] - samples[row])
         message = f"{step:g} s makes {count:.3g} instants of {len(samples)} rows, where after {before} comes {after}"
         remedy = (
             "was the clock set there? Remove the rows of the wrong time, or split the log; else write a longer step"
         )
-        raise DataError(f"{message}: {remedy}", file=file, path=path)
+        raise DataError(f"{message}: {remedy}", file=file, path="clock.step")
     return np.asarray(first + step * np.arange(count), dtype=np.float64)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
@@ -16,7 +15,6 @@ from shipid.data.dataset import FIRST_DATED_TIME, Array
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
 HOUR = 3600.0  # s: by which local time goes back at the end of daylight saving
-WEEKS = 7 * 1024  # days after which the week number of GPS begins again
 TIME_OF_DAY = r"\s*(\d\d?):(\d\d)(?::(\d\d(?:[.,]\d+)?))?\s*([AaPp][Mm])?\s*"
 MOMENT = rf"^(?:(.*?\S)(?:[\sT_]+|(?<=\D\d\d\d):))??{TIME_OF_DAY}$"
 """A date, if there is one, and a time of day: its groups are these, hour, minute, second, and half of the day."""
@@ -41,34 +39,12 @@ ISO = r"\d{4}-\d\d-\d\d[T ][\d:.]+\s*(?:Z|[+-][\d:]+)?"
 """A date and a time of day in ISO 8601."""
 ZONE = r":\d\d(?:\.\d+)?\s*(?:Z|[+-]\d\d(?::?\d\d)?)$|T\d\d(?::?\d\d)*(?:\.\d+)?(?:Z|[+-]\d\d(?::?\d\d)?)$"
 """The end of a date in ISO 8601 that says its zone."""
-_SAID = re.compile(
-    r"(?:\b(?:UTC|GMT)|\b(?:tz|time[ _]?zone|Zeitzone|UTC[ _]?offset)\W{1,4}(?:UTC|GMT)?)"
-    r"\s*[+-]\s*0?[1-9]\d?(?::?\d\d)?\b"
-    r"|\b(?:tz|time[ _]?zone|Zeitzone)\W{1,4}(?!UTC|GMT|Etc)[A-Z]\w+(?:/\w+)*|\blocal[ _]time\b|\b(?:Orts|Lokal)zeit\b"
-    r"|\blokale?[ _]?(?:tid|tijd)\b|\b(?:heure|ora)[ _]locale\b|\bhora[ _]local\b",
-    re.IGNORECASE,
-)
-"""A zone other than UTC in the head of a log, or in the name of its clock."""
-_SAID_OF_CLOCK = re.compile(
-    r"(?<![A-Za-z])(?:CES?T|MES?Z|[ECMP][SD]T|JST|KST|AE[SD]T|LT"
-    r"|(?i:(?:heure |ora )?locale|local|lokale?(?:[ _]?(?:tid|tijd))?))(?![A-Za-z])"
-)
-"""A zone in letters, in the name of a clock alone."""
-ZONE_REMEDY = "write UTC, or the zone behind every time, as in 2024-05-14T08:00:00+01:00"
 DAYS = (
     *("%Y-%m-%d", "%Y-%j", "%d.%m.%Y", "%d.%m.%y", "%d-%b-%Y"),
     *("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%y-%m-%d"),
 )
 """Ways in which a date may be written, with - for any other mark than a point, and between eight digits."""
 LAST_DATE = 253_402_300_800.0  # s: the begin of the year 10000, as a clock that counts from 1970 has it
-
-
-def other_zone(head: str, clock: str, first: str) -> str:
-    """Say that a first time without a zone is read as UTC, where the head of a log, or its clock's name, has one."""
-    said = _SAID_OF_CLOCK.search(clock) or _SAID.search(f"{head}\n{clock}")
-    if said is None or re.search(f"{ZONE}|{UTC_BEHIND}|^{TIME_OF_DAY}$", first):
-        return ""
-    return f"{first!r} is read as UTC, and the log says {said[0]!r}"
 
 
 def parse_dates(dates: pd.Series[Any]) -> Array:
@@ -103,7 +79,7 @@ def parse_dates(dates: pd.Series[Any]) -> Array:
         of_day = np.where(half.isna(), since, since % HALF_DAY + HALF_DAY * half.eq("pm"))  # 12 AM is midnight
         alone = found[0].isna()
         of_one = over_midnights(np.where(alone, of_day, np.nan))
-        since = of_one if alone.mean() > 0.5 else day_readings(found[0])[0] + of_day
+        since = of_one if alone.mean() > 0.5 else read_days(found[0]) + of_day
     else:
         zoned = texts.str.contains(ZONE)
         since = _since_1970(texts.where(zoned | (not zoned.any())))
@@ -115,10 +91,10 @@ def are_in_one_number(values: Array) -> bool:
     return bool(len(values) and np.all((values > 1.9e13) & (values < 2.1e13)))
 
 
-def day_readings(days: pd.Series[Any]) -> list[Array]:
-    """Dates (N,) of text as seconds since 1970, NaN for none, in each way that reads most of them.
+def read_days(days: pd.Series[Any]) -> Array:
+    """Dates (N,) of text as seconds since 1970, NaN for none, in the way that reads most of them.
 
-    Of several those with which the log is shortest, day/month first; one of NaN alone where no way reads them.
+    Of several that with which the log is shortest, day/month first; NaN alone where no way reads most.
     """
     places, known = pd.factorize(days)
     texts = pd.Series(known, dtype="str").str.replace(r"[/ :_]+", "-", regex=True)
@@ -126,10 +102,11 @@ def day_readings(days: pd.Series[Any]) -> list[Array]:
     moments = (pd.Series(pd.to_datetime(texts, format=way, utc=True, errors="coerce")) for way in DAYS)
     read = (np.append(_since_1970(one), np.nan)[places] for one in moments)
     readings = [one for one in read if np.isfinite(one).sum() > 0.5 * len(one)]
-    sizes = [(int(np.isnan(one).sum()), float(np.nanmax(one) - np.nanmin(one))) for one in readings]
-    return [one for one, size in zip(readings, sizes, strict=True) if size == min(sizes)] or [
-        np.full(len(days), np.nan)
-    ]
+    return min(
+        readings,
+        key=lambda one: (int(np.isnan(one).sum()), np.ptp(one[np.isfinite(one)])),
+        default=np.full(len(days), np.nan),
+    )
 
 
 def format_date(moment: float) -> str:
@@ -140,13 +117,6 @@ def format_date(moment: float) -> str:
 def format_moment(t: float) -> str:
     """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
     return f"{format_date(t)} UTC" if FIRST_DATED_TIME < t < LAST_DATE else f"{t:.10g} s"
-
-
-def rollover_words(step: float) -> str:
-    """Words for a step [s] of 1,024 weeks, to an hour, forward or back; empty for any other."""
-    remedy = f"add {WEEKS * DAY:.0f} s to the older dates"
-    words = f" (1,024 weeks apart: the week number of a GPS receiver rolled over, {remedy})"
-    return words if abs(abs(step) - WEEKS * DAY) < HOUR else ""
 
 
 def format_span(first: float, last: float) -> str:

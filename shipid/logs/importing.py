@@ -25,8 +25,6 @@ from shipid.data.dataset import (
     clock_slack,
     optional_columns,
     required_columns,
-    sample_columns,
-    stretches_of_runs,
     unit_of_column,
     units_of_columns,
 )
@@ -37,12 +35,10 @@ from shipid.logs.channels import (
     Channel,
     close_gaps,
     common_instants,
-    instants_at_step,
     interpolation_rule,
     resample_channel,
 )
-from shipid.logs.dates import ZONE_REMEDY, format_moment, format_span, other_zone
-from shipid.logs.formats import TextFormat
+from shipid.logs.dates import format_moment, format_span
 from shipid.logs.frames import check_wraps, in_body, project_positions, true_wind, unwrap_angles
 from shipid.logs.instants import read_clock, read_time_column, without_repeats
 from shipid.logs.mapping import (
@@ -103,7 +99,7 @@ def import_log(
     Order: units, resampling of channels, repair of wrapping channels, unwrapping, `despike` and `scale` of speed,
     course, latitude or longitude, `despike` of a heading that turns velocities over ground, position on the Earth to
     north and east, and directions to the north of that plane, gaps, speed and course or earth-fixed to body velocities,
-    the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs, resampling.
+    the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs.
     `metadata["repairs"]` counts every repair, `flags` marks its rows.
 
     file : the log; with `source.runs`, the folder of its files. without : kinds of repair to leave out.
@@ -114,7 +110,7 @@ def import_log(
     source, off = as_path("file", file, DataError), tuple(without)
     for kind in off:
         check_choice("repair", kind, REPAIRS, DataError)
-    digest, state = log_digest(mapping, source), _state_of_files(mapping, source)
+    digest = log_digest(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(
             "not the file this mapping was written for (sha256 differs): fetch that file, or copy the mapping, "
@@ -130,7 +126,7 @@ def import_log(
             mapping = mapping.model_copy(
                 update={"origin": PlaneOrigin.model_construct(latitude=first[0], longitude=first[1])}
             )
-    if (digest, state) != (log_digest(mapping, source), _state_of_files(mapping, source)):  # or a link led elsewhere
+    if digest != log_digest(mapping, source):
         raise DataError("has changed while it was read: import it again when nothing writes to it", file=source)
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows, repairs = parts[0].rows, _add_records([part.records for part in parts])
@@ -161,8 +157,7 @@ def import_log(
     frame = frames[0] if len(frames) == 1 else pd.concat(frames, ignore_index=True)
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
-    dataset = Dataset(frame, metadata)
-    return _resample_log(dataset, mapping.resample.step, source) if mapping.resample else dataset
+    return Dataset(frame, metadata)
 
 
 def run_files(source: LogSource, log: Path) -> dict[str, Path]:
@@ -216,13 +211,6 @@ def _files_of_log(mapping: Mapping, log: Path) -> list[Path]:
     return [*run_files(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
 
 
-def _state_of_files(mapping: Mapping, log: Path) -> list[tuple[int, int]]:
-    """Number and time of change [ns] of files and of links on the way to them: a change that was taken back differs."""
-    files = _files_of_log(mapping, log)
-    links = [place.lstat() for file in files for place in (file, *file.absolute().parents) if place.is_symlink()]
-    return [(state.st_ino, state.st_ctime_ns) for state in (*links, *(file.stat() for file in files))]
-
-
 def file_digest(file: Path) -> str:
     """The SHA-256 of a file in hex; raises DataError if it cannot be read."""
     require_file(file)
@@ -243,27 +231,12 @@ def _run_tables(
     whole_rows = mapping.clock.repeated == "drop" and mapping.clock.every is not None  # compared in all columns
     for run, file in logs.items():
         log = read_log_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
-        if file == next(iter(logs.values())):  # once for all of them
-            _warn_of_zone(log, mapping, file)
         first = 0
         for end in [*_clock_restart_rows(log, mapping, file), len(log)]:
             part = log.iloc[first:end] if first or end < len(log) else log
             part.attrs = {} if first else log.attrs
             yield run, file, part
             first = end
-
-
-def _warn_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
-    """Warn where dates without a zone count as UTC, and the head of the log or the name of its clock says another."""
-    if mapping.clock.unit != "date" or len(mapping.clock.sources) > 1:
-        return
-    (clock,), form, head = mapping.clock.sources, mapping.format, ""
-    if isinstance(form, TextFormat):
-        with file.open(encoding=form.encoding, errors="replace") as stream:
-            head = "".join(itertools.islice(stream, form.skip_rows))
-    first = str(log_column(table, clock, file, "clock.from").iloc[0]).strip()
-    if said := other_zone(head, clock, first):
-        logger.warning("%s: clock.from: %s: if it is the time there, %s", file.name, said, ZONE_REMEDY)
 
 
 def _clock_restart_rows(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:
@@ -420,9 +393,8 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
         sides = side_letters(name) if column.unit == "deg" and isinstance(column.source, str) else ""
-        place, share = f"columns.{name}.from", {"factor", "curve"} & column.model_fields_set
-        units = (column.unit, *(["%"] if share else []))
-        parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
+        place = f"columns.{name}.from"
+        parts = [parse_numbers(table, one, form, other, place, sides) for one in source_columns(column.source)]
         parts = [np.where(np.isin(one, column.missing), np.nan, one) for one in parts] if column.missing else parts
         names, coded = source_columns(column.source), column.unit in CODES and (column.unit != "deg" or len(parts) > 1)
         numbers = decode_numbers(parts, names, column.unit, table, other, place) if coded else parts[0]
@@ -562,19 +534,3 @@ def _name_run(rows: pd.DataFrame, run: str) -> pd.DataFrame:
     named = rows.copy(deep=False)
     named.insert(0, "run", pd.Series(run, index=rows.index, dtype="str"))
     return named
-
-
-def _resample_log(dataset: Dataset, step: float, file: Path) -> Dataset:
-    """Rows `step` [s] apart; the first row of a stretch keeps its flags, so breaks stay."""
-
-    def resample() -> Iterator[pd.DataFrame]:
-        for run, rows in stretches_of_runs(dataset):
-            t = rows["t"].to_numpy()
-            instants = instants_at_step(t[0], t[-1] + clock_slack(t), step, [t], file, "resample.step")
-            frame = pd.DataFrame({"t": instants, **sample_columns(rows, instants)})
-            frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
-            # a break that stays flagged while its row is held over several instants would break each of them
-            bit = 1 << FLAGS.index(BREAK)
-            yield frame.assign(flags=frame["flags"] & np.where(np.arange(len(frame)) == 0, -1, ~bit))
-
-    return Dataset(pd.concat(list(resample()), ignore_index=True)[list(dataset.frame.columns)], dataset.metadata)

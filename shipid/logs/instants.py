@@ -18,7 +18,6 @@ from shipid.logs.dates import (
     format_moment,
     join_date_and_time,
     parse_dates,
-    rollover_words,
     time_texts,
 )
 from shipid.logs.formats import Format
@@ -46,7 +45,7 @@ def check_times(log: pd.DataFrame, t: Array, clock: Clock | FileClock, file: Pat
             what = f"the time {format_moment(t[row])} appears twice: "
             what += "remove one of the rows, or set [clock] repeated = 'drop'"
         else:
-            back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}{rollover_words(t[row] - t[row - 1])}"
+            back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}"
             what = f"time goes back {back}: sort or split the log; if it is local time, write UTC"
         raise DataError(what, file=file, path=row_in_words(log, row))
     if every is not None:

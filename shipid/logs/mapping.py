@@ -60,7 +60,7 @@ UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "m/s": {"m/s": 1.0, "kn": KNOT, "km/h": 1.0 / 3.6, "mph": 0.44704, "cm/s": 1e-2, "mm/s": 1e-3},
     "rad": {"rad": 1.0, "deg": DEGREE, "ddmm": DEGREE, "quaternion": 1.0},
-    "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / MINUTE, "ais": DEGREE / MINUTE},
+    "rad/s": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / MINUTE},
     "rev/s": {"rev/s": 1.0, "rpm": RPM, "rad/s": 0.15915494309189535},
     "N": {"N": 1.0, "kN": 1e3},
     "N m": {"N m": 1.0, "kN m": 1e3, "Nm": 1.0, "kNm": 1e3},
@@ -72,7 +72,7 @@ mile per hour: 1609.344 m, international yard and pound agreement, 1959).
 `date`, `datenum`, `excel`, `mjd` and `jd` are read as seconds since 1970 (UTC), and so are the times of segments and
 breaks; `hhmmss` as seconds since the first midnight; `s + ns` is of two columns, seconds and the rest of them.
 `ddmm`, of latitude and longitude only, are degrees and minutes; `quaternion`, of the heading only, four columns
-x, y, z, w; `ais`, of the yaw rate only, the numbers of `rate_of_ais`.
+x, y, z, w.
 """
 EPOCHS = {"datenum": 719529.0, "excel": float(EXCEL), "mjd": 40587.0, "jd": 2440587.5}
 """Unit of a clock in days -> number of 1 January 1970 (MATLAB: datenum; Excel: 1900 date system; Julian dates, modified
@@ -250,12 +250,6 @@ class RunParts(StrictPart):
     pause: float | None = Field(default=None, gt=0)
 
 
-class Resample(StrictPart):
-    """Instants `step` [s] apart from the start of every unbroken stretch."""
-
-    step: float = Field(gt=0)
-
-
 class Mapping(StrictPart):
     """A whole mapping; `repair` holds parameters in SI units."""
 
@@ -271,7 +265,6 @@ class Mapping(StrictPart):
     repair: tuple[SerializeAsAny[Repair], ...] = ()
     segment: tuple[Segment, ...] = ()
     parts: RunParts | None = None
-    resample: Resample | None = None
     digest: str
 
     @property
@@ -348,15 +341,6 @@ def degrees_and_minutes(values: NDArray[np.float64]) -> NDArray[np.float64]:
     size = np.abs(values)
     degrees = size // 100 + np.where(size % 100 < 60, size % 100, np.nan) / 60.0
     return np.asarray(np.copysign(degrees, values), dtype=np.float64)
-
-
-def rate_of_ais(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rates of turn (N,) as messages of AIS have them, 4.733 times the root of deg/min, in deg/min.
-
-    NaN for 127, -127 and -128, which say no rate (ITU-R M.1371).
-    """
-    rates = np.copysign(np.square(values / 4.733), values)
-    return np.asarray(np.where(np.abs(values) < 126.5, rates, np.nan), dtype=np.float64)
 
 
 def degrees_in_parts(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -485,11 +469,6 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> Faults:
             column.unit == "ddmm" and name not in ("latitude", "longitude"),
             f"{path}.unit",
             "only latitude and longitude are in degrees and minutes: write deg or rad",
-        )
-        yield (
-            column.unit == "ais" and name != "r",
-            f"{path}.unit",
-            "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min",
         )
         four = not isinstance(column.source, str) and len(column.source) == 4
         yield (

@@ -20,6 +20,10 @@ NUMBERS = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
 MATRIX, PACKED = 14, 15
 HOLDERS = frozenset({1, 2, 3, 16, 17})
 """Types of elements, and classes of matrices that hold others: MathWorks, MAT-File Format, tables 1-1, 1-3; scipy."""
+NO_VECTOR = (
+    ", not a vector of numbers: save one of it, such as by cell2mat, full, real, squeeze, .', str2double, datenum, "
+    "seconds, [s.x] of structs, or table2struct(T, 'ToScalar', true)"
+)
 MOST_SIGNALS = 100  # columns of a matrix that has fewer rows: more are times
 
 
@@ -40,14 +44,13 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
             order = ">" if content[126:128] == b"MI" else "<"
             _check_elements(memoryview(content)[128:], order, NUMBERS | {MATRIX, PACKED})
         variables = loadmat(file, simplify_cells=True)
-        vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))
+        vectors, other = dict(_numeric_vectors(variables)), dict(_no_vectors(variables))
     except (DataError, OSError, MemoryError):  # the last of the system, whatever is in the file
         raise
     except Exception as error:  # scipy defines no error class: a damaged file raises any of a dozen
         raise DataError(
             f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind", file=file, path="format.kind"
         ) from None
-    other = {name: f"{what}: {remedy}" if remedy else what for name, what, remedy in further}
     if not vectors:
         first = next(iter(other), None)
         which = f"; {first!r} is {other[first]}" if first is not None else ""
@@ -61,8 +64,8 @@ def read_mat(file: Path, _: MatFormat, columns: Sequence[str], *__: object) -> p
     }
     table = pd.DataFrame({name: values for name, values in vectors.items() if name not in short})
     table.attrs["other"] = other | short
-    anew = {name for name, _, remedy in further if remedy} | {*short}
-    table.attrs["notes"] = [f"{name!r} is {what}" for name, what in table.attrs["other"].items() if name in anew]
+    anew = {**{name: what for name, what in other.items() if what.endswith(NO_VECTOR)}, **short}
+    table.attrs["notes"] = [f"{name!r} is {what}" for name, what in anew.items()]
     return table
 
 
@@ -132,38 +135,30 @@ def _open_structs(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple
             yield f"{prefix}{key}", value
 
 
-def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
-    """Dotted name of every variable that is no vector of numbers, what it is, and how MATLAB makes a vector of it."""
+def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str]]:
+    """Dotted name of every variable that is no vector of numbers, and what it is."""
     for name, value in _open_structs(variables):
-        last = name.rpartition(".")[2]
-        cells = list(value.flat) if isinstance(value, np.ndarray) and value.dtype == object else value
-        if isinstance(value, np.ndarray) and value.dtype.names:  # a datetime, a table: scipy does not open them
-            about = [text.decode() if isinstance(text, bytes) else str(text) for text in value.ravel()[0]][:3]
-            remedy = "save seconds(t - t(1)) of a datetime, table2struct(T, 'ToScalar', true) of a table"
-            yield about[0], f"an object of class {about[2]}, not a vector of numbers", remedy
+        array = np.asarray(value.shape if _is_sparse(value) else value)
+        if array.dtype.names:  # a datetime, a table: scipy does not open them
+            about = [text.decode() if isinstance(text, bytes) else str(text) for text in array.ravel()[0]][:3]
+            yield about[0], f"an object of class {about[2]}{NO_VECTOR}"
         elif _is_sparse(value):
-            yield name, "a sparse matrix, not a vector or full matrix", f"save {last} = full({last})"
-        elif isinstance(cells, list) and cells and isinstance(cells[0], dict):
-            field = next(iter(cells[0]), "x")
-            remedy = f"save a struct of vectors, such as s.{field} = [{name}.{field}]"
-            yield name, f"an array of {len(cells)} structs, not a struct of vectors", remedy
-            yield from ((f"{name}.{key}", "in an array of structs", remedy) for key in cells[0])
-        elif isinstance(cells, list):
-            remedy = f"save {last} = cell2mat({last}), or datenum({last}) of dates"
-            yield name, f"an array of {len(cells)} cells, not a vector of numbers", remedy
-        elif np.asarray(value).dtype.kind == "U":
-            yield name, "text, not a vector of numbers", f"save str2double({last}), or datenum({last}) of dates"
-        elif np.iscomplexobj(value):
-            yield name, "complex, not a vector of real numbers", f"save real({last})"
-        elif np.ndim(value) > 2:
-            what = f"an array of {' x '.join(map(str, value.shape))}, not a vector or matrix"
-            yield name, what, f"save squeeze({last}), or one part of it"
-        elif np.ndim(value) == 0:
-            yield name, "a single number, not a vector", ""
-        elif np.ndim(value) == 2 and _is_transposed(value):
-            yield name, "a matrix of {} x {}, a row for each signal".format(*value.shape), f"save {last} = {last}.'"
-        elif np.ndim(value) == 2:
-            yield name, f"a matrix: its columns are {name}.1 to {name}.{value.shape[1]}", ""
+            yield name, f"a sparse matrix{NO_VECTOR}"
+        elif array.dtype == object and array.size and isinstance(array.flat[0], dict):
+            yield from ((one, f"in an array of structs{NO_VECTOR}") for one in (name, *_keys_of(name, array.flat[0])))
+        elif array.dtype.kind in "OUc" or array.ndim > 2:
+            what = {"O": "an array of cells", "U": "text", "c": "complex"}.get(array.dtype.kind)
+            yield name, f"{what or f'an array of {array.ndim} axes'}{NO_VECTOR}"
+        elif array.ndim == 0:
+            yield name, "a single number, not a vector"
+        elif array.ndim == 2 and _is_transposed(array):
+            yield name, f"a matrix with a row for each signal{NO_VECTOR}"
+        elif array.ndim == 2:
+            yield name, f"a matrix: its columns are {name}.1 to {name}.{array.shape[1]}"
+
+
+def _keys_of(name: str, struct: dict[str, Any]) -> Iterable[str]:
+    return (f"{name}.{key}" for key in struct)
 
 
 def is_mat(_: Path, head: bytes) -> dict[str, Any] | None:

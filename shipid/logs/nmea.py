@@ -259,12 +259,11 @@ class _Heard:
 
     def nothing(self) -> str:
         """Say why no row is there."""
-        kinds = ", ".join(kind for kind, _ in self.unread.most_common(5))
-        if self.unread and all(kind.endswith(("VDM", "VDO")) for kind in self.unread):
-            return f"messages of AIS alone ({kinds}), not read: decode them, and write a CSV with the rows of one ship"
-        others = f", and its sentences are of other kinds: {kinds}" if self.unread else ""
+        others = "".join(f", {kind}" for kind, _ in self.unread.most_common(5))
         message = f"no sentence with a time and a value ({self.unreadable} unreadable lines{others})"
-        return f"{message}: set [format] kind or time"
+        return (
+            f"{message}: set [format] kind or time; decode messages of AIS, and write a CSV with the rows of one ship"
+        )
 
 
 def _rows_of_times(said: dict[str, list[tuple[float, int, str]]], times: Array) -> pd.DataFrame:

@@ -122,14 +122,6 @@ def has_nul(content: bytes, form: TextFormat) -> bool:
     return b"\0" in content and not form.encoding.startswith(("utf-16", "utf-32"))
 
 
-def refuse_power_cut(content: bytes, file: Path) -> None:
-    """Raise DataError at the first line with NUL bytes, where most lines have none and all else is text."""
-    lines = content.splitlines()
-    damaged = [number for number, line in enumerate(lines, start=1) if b"\0" in line]
-    if damaged and len(damaged) < len(lines) / 2 and not re.search(rb"[\x01-\x08\x0e-\x1a]", content):
-        raise DataError("holds NUL bytes, as after a power cut: remove them", file=file, path=f"line {damaged[0]}")
-
-
 def _read_text(file: Path, form: TextFormat, columns: Sequence[str], *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     content = file.read_bytes()
@@ -137,7 +129,6 @@ def _read_text(file: Path, form: TextFormat, columns: Sequence[str], *_: object)
         kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, content[:ENOUGH])), None)
         if kind is not None:
             raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
-        refuse_power_cut(content, file)
         message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
         raise DataError(message, file=file, path="format.encoding")
     try:

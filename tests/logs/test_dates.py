@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.dates import date_texts, day_readings, format_date, format_moment, format_span, parse_dates, time_texts
+from shipid.logs.dates import date_texts, format_date, format_moment, format_span, parse_dates, read_days, time_texts
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.conftest import T, import_written, mapping_with
@@ -119,40 +119,6 @@ def test_noon_and_midnight_of_twelve_hours() -> None:
     np.testing.assert_allclose(parse_dates(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
 
 
-@pytest.mark.parametrize(
-    ("head", "clock", "behind", "said"),
-    [
-        ("# tz=+01:00\n# vessel 7\n", "time", "", "tz=+01:00"),
-        ("Time zone: Europe/Oslo\n", "time", "", "Time zone: Europe/Oslo"),
-        ("all times are local time\n", "time", "", "local time"),
-        ("", "time (UTC+2)", "", "UTC+2"),
-        ("", "Zeit [MESZ]", "", "MESZ"),
-        ("", "heure locale", "", "heure locale"),
-        ("# tz=+01:00\n", "time", "+01:00", ""),
-        ("# tz=+00:00\n", "time", "", ""),
-        ("Time zone: UTC\n", "time (UTC)", "", ""),
-        ("est. speed in a local frame, 12-05-2024\n", "time", "", ""),
-    ],
-)
-def test_a_zone_that_only_the_head_says_is_warned_of(
-    head: str,
-    clock: str,
-    behind: str,
-    said: str,
-    log: pd.DataFrame,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    """Before, the times were counted as UTC without a word."""
-    moments = pd.Timestamp("2024-05-14T08:00:00") + pd.to_timedelta(log["time"], "s")
-    written = log.assign(time=moments.dt.strftime("%Y-%m-%d %H:%M:%S.%f") + behind).rename(columns={"time": clock})
-    (tmp_path / "log.csv").write_text(head + written.to_csv(index=False))
-    dated = ('from = "time"', f'from = "{clock}"\nunit = "date"')
-    mapping = mapping_with(tmp_path, f"skip_rows = {len(head.splitlines())}", dated)
-    import_log(read_mapping(mapping), tmp_path / "log.csv")
-    assert [f"is read as UTC, and the log says {said!r}" in one for one in caplog.messages] == [True] * bool(said)
-
-
 @pytest.mark.parametrize("zone", ["Z", "-0330"])
 def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log: pd.DataFrame, tmp_path: Path) -> None:
     """As UTC it would be hours off; with no zone anywhere every row is UTC."""
@@ -180,10 +146,10 @@ def test_dates_in_columns_of_numbers() -> None:
     year, month, day = [2024.0, 24.0, 68.0, 69.0, 2024.0, 2024.0, 2024.0, 2024.0], [12.0] * 8, [31.0] * 8
     month[4], day[5], day[6], year[7] = 13.0, 32.0, 1.5, np.nan
     texts = date_texts([np.array(one) for one in (year, month, day)])
-    (days,) = day_readings(pd.concat([texts.iloc[:4], texts]))  # most of them can be read
+    days = read_days(pd.concat([texts.iloc[:4], texts]))  # most of them can be read
     moments = [*["2024-12-31", "2024-12-31", "2068-12-31", "1969-12-31"] * 2, None, None, None, None]
     np.testing.assert_array_equal(days, (pd.to_datetime(moments) - pd.Timestamp(0)).total_seconds())
-    (of_year,) = day_readings(date_texts([np.array([2024.0, 2024.0, 2024.0]), np.array([1.0, 366.0, 367.0])]))
+    of_year = read_days(date_texts([np.array([2024.0, 2024.0, 2024.0]), np.array([1.0, 366.0, 367.0])]))
     np.testing.assert_array_equal(of_year, [1704067200.0, 1735603200.0, np.nan])
 
 
@@ -222,18 +188,6 @@ def test_a_date_in_one_number_beside_a_time_of_day(
     sniffed = recognise_log(file)
     assert sniffed.clock == {"from": "time", "unit": "date", "date": "Date"}
     np.testing.assert_allclose(sniffed.t, since, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("day", "other"), [("140524", "2014-05-24"), ("240514", "2024-05-14"), ("50624", "2024-05-06")]
-)
-def test_a_date_of_six_digits_that_may_be_another_is_asked(
-    day: str, other: str, log: pd.DataFrame, tmp_path: Path
-) -> None:
-    times = pd.to_datetime(T, unit="s").strftime("%H:%M:%S.%f")
-    log.assign(time=times, Date=day).to_csv(tmp_path / "log.csv", index=False)
-    (asked,) = recognise_log(tmp_path / "log.csv").doubts
-    assert other in asked
 
 
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:

@@ -155,13 +155,14 @@ def test_short_gaps_are_filled_and_long_ones_break(plain_mapping: Write, tmp_pat
 
 
 def test_resampling_keeps_the_motion(plain_mapping: Write, tmp_path: Path) -> None:
-    frame = imported(turning(T), plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
+    mapping = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 2.0\nstep = 1.0'))
+    frame = imported(turning(T), mapping, tmp_path).frame
     assert np.unique(np.diff(frame["t"])).tolist() == [1.0]
     every_other = turning(T).iloc[::2].reset_index(drop=True)
     np.testing.assert_allclose(frame["north"], every_other["north"], atol=1e-9)
     np.testing.assert_allclose(frame["propeller.n"], every_other["port.n"], atol=1e-12)
     unix = turning(T).assign(t=1.7e9 + T)
-    moved = imported(unix, plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
+    moved = imported(unix, mapping, tmp_path).frame
     np.testing.assert_array_equal(moved["propeller.n"], frame["propeller.n"])
 
 

@@ -34,15 +34,15 @@ def cells(values: np.ndarray) -> np.ndarray:
 
 
 NO_VECTORS: dict[str, tuple[Any, str]] = {
-    "cells": (cells(T), r"'rpm' is an array of 120 cells, not a vector of numbers: save rpm = cell2mat\(rpm\)"),
-    "text": ("120 rpm", "'rpm' is text, not a vector of numbers: save str2double"),
-    "complex": (T + 1j, r"'rpm' is complex, not a vector of real numbers: save real\(rpm\)"),
+    "cells": (cells(T), r"'rpm' is an array of cells, not a vector of numbers: save one of it, such as by cell2mat"),
+    "text": ("120 rpm", "'rpm' is text, not a vector of numbers"),
+    "complex": (T + 1j, "'rpm' is complex, not a vector of numbers"),
     "of another length": (T[:7], "'rpm' is of 7 values, and 'time' has 120"),
     "a single number": (2.0, "'rpm' is a single number, not a vector"),
     "a matrix": (np.stack([T, T], axis=1), r"'rpm' is a matrix: its columns are rpm\.1 to rpm\.2"),
-    "a row for each signal": (np.zeros((2, 120)), r"'rpm' is a matrix of 2 x 120, a row for each signal: .* rpm\.'"),
-    "sparse": (csc_matrix(np.stack([T, T], axis=1)), r"'rpm' is a sparse matrix, .*: save rpm = full\(rpm\)"),
-    "of three axes": (np.zeros((120, 2, 2)), "'rpm' is an array of 120 x 2 x 2, not a vector or matrix"),
+    "a row for each signal": (np.zeros((2, 120)), "'rpm' is a matrix with a row for each signal, not a vector"),
+    "sparse": (csc_matrix(np.stack([T, T], axis=1)), "'rpm' is a sparse matrix, not a vector of numbers"),
+    "of three axes": (np.zeros((120, 2, 2)), "'rpm' is an array of 3 axes, not a vector"),
 }
 
 

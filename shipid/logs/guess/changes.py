@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.lapses import clock_text
-from shipid.logs.guess.search import senses_of_angle
+from shipid.logs.guess.search import WAYS, Sense, senses_by_quarters, senses_of_angle
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_command, is_steering
@@ -22,9 +22,9 @@ Windows = NDArray[np.bool_]
 Change = tuple[tuple[str, ...], str, list[int]]
 """Columns that it is about, a sentence with a place for where it is, and numbers of the parts."""
 STRETCHES, FEWEST = 10, 20  # of one log; windows of a file or stretch that decides, at least
-CLEAR = 4.0  # times the misfit of the better unit, that the other leaves at least
+CLEAR = 4.0  # times the misfit of the better reading, that the usual one leaves at least
 SCALED = 0.005  # share of a motion that one scale leaves, at least, where there are two
-APART = np.radians(1.0)  # by which the track keeps to a heading more than to a course, at least
+APART = 1.5e-4  # 1 - cos(1 deg): by which the track keeps more to another reading, at least
 UNDER_WAY = 0.4  # of the larger speeds: below, thrust turns a ship as much as an angle does
 
 
@@ -36,9 +36,8 @@ def ask_for_changes(state: State, pause: float) -> None:
         edges = np.linspace(0, len(state.t), STRETCHES + 1).astype(int).tolist()
     middle = (state.chosen.first + state.chosen.last) // 2
     parts = [(middle >= first) & (middle < end) for first, end in pairwise(edges)]
-    changes = [*_other_units_of_heading(state, parts)] or [*_other_scales(state, parts)]
+    changes = [*_other_readings(state, parts, middle, files)] or [*_other_scales(state, parts)]
     changes += _other_senses(state, parts, edges)
-    changes += [*_course_as_heading(state, parts, middle), *_other_axes(state, parts, middle)] if files else []
     for about, words, odd in changes:
         ends = edges[odd[0]], min(edges[odd[-1] + 1], len(state.t) - 1)
         place = f"from {' to '.join(clock_text(state, float(state.t[row])) for row in ends)}"
@@ -84,49 +83,39 @@ def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[
     return (odd, two[0].scale / two[1].scale) if clear else ([], 1.0)
 
 
-def _other_units_of_heading(state: State, parts: list[Windows]) -> Iterator[Change]:
-    """Yield where the track turns with a heading in degrees, while elsewhere it turns with one in radians."""
-    psi = next((one.source for one in state.suggestions if one.name == "psi"), None)
-    values = state.columns.get(psi or "", 0.0 * state.t)[state.chosen.first]
-    track, ways = state.chosen.change(state.position), (np.exp(1j * values * to_si("deg", "psi")), np.exp(1j * values))
-    kinds: tuple[list[int], list[int]] = [], []
-    for number, part in enumerate(parts):
-        degrees, radians = (senses_of_angle(track[part], way[part])[0][0] for way in ways)
-        good, bad = sorted((degrees, radians))
-        in_radians = radians < degrees and bool(np.abs(values[part]).max(initial=0.0) < 3 * np.pi)
-        if part.sum() >= FEWEST and good < SETTINGS.poor and bad > max(CLEAR * good, SETTINGS.spread):
-            kinds[in_radians].append(number)
-    if all(kinds):
-        words = f"is {psi!r} in radians {{}}, and elsewhere in degrees, as the track turns? Then write it in one"
-        yield ("psi",), f"{words} unit, or cut it there", kinds[True]
+def _other_readings(state: State, parts: list[Windows], middle: NDArray[np.intp], files: bool) -> Iterator[Change]:
+    """Yield where the track keeps to the heading in another unit than in most parts.
 
-
-def _course_as_heading(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:
-    """Yield where the track of a file keeps to the heading, and in others to the course."""
-    psi = next(one for one in state.suggestions if one.name == "psi")
-    track, courses = state.chosen.change(state.position), state.all_called("course")
-    for name in dict.fromkeys([*courses, *state.all_called("psi")]):
-        turn = to_si(unit_in_name(name, "rad") or psi.unit, "psi")
-        ways = np.exp(1j * np.stack([state.psi, turn * state.columns[name]])[:, middle])
-        away = np.abs(np.angle(track * np.conj(ways)))
-        off = np.array([np.median(away[:, one], axis=1) if one.sum() >= FEWEST else (1.0, 1.0) for one in parts])
-        odd = np.flatnonzero(off[:, 0] < 0.5 * off[:, 1] - APART).tolist()
-        if name != psi.source and odd and np.any(off[:, 1] < 0.5 * off[:, 0] + APART * (name in courses)):
-            words = f"{{}} the track keeps to {psi.source!r}, in the others to {name!r}: are they exchanged there"
-            yield ("psi", "course", "u", "v", "r"), f"{words}? Then import it alone", odd
-
-
-def _other_axes(state: State, parts: list[Windows], middle: NDArray[np.intp]) -> Iterator[Change]:
-    """Yield each file whose track keeps to the heading with other axes, or another sense, than in the others."""
-    track, heading = state.chosen.change(state.position), np.exp(1j * state.psi[middle])
+    In files also by another sense, or to another column.
+    """
     psi = next(one.source for one in state.suggestions if one.name == "psi")
-    for number, part in enumerate(parts if not state.astern else ()):
-        (misfit, sense), (other, _) = senses_of_angle(track[part], heading[part])
-        odd = sense.quarter != 0 or (sense.sign < 0 and other > 2.0 * misfit)
-        if odd and misfit < SETTINGS.poor and part.sum() >= FEWEST:
-            words = f"{{}} the track does not keep to {psi!r} as in the others: are its axes, or its heading, others?"
-            about = "psi", "north", "east", "latitude", "longitude"
-            yield about, f"{words} Then leave it out, and import it alone", [number]
+    sure = [number for number, part in enumerate(parts) if part.sum() >= FEWEST]
+    track, left = state.chosen.change(state.position), dict[tuple[str, str, Sense | None], list[float]]()
+    for name in dict.fromkeys([psi, *[*state.all_called("course"), *state.all_called("psi")] * files]):
+        for unit, part in product(("deg", "rad"), (parts[number] for number in sure)):
+            seen, way = track[part], np.exp(1j * to_si(unit, "psi") * state.columns[name][middle[part]])
+            for misfit, sense in senses_by_quarters(seen, way) if files else [(senses_of_angle(seen, way)[0][0], None)]:
+                left.setdefault((name, unit, sense), []).append(misfit)
+    own = {f"{psi!r} {_sense_in_words(*key[1:])}": np.array(one) for key, one in left.items() if key[0] == psi}
+    every = {repr(name): np.min([left[key] for key in left if key[0] == name], axis=0) for name, *_ in left}
+    for about, kinds, remedy in (
+        (("psi", "north", "east", "latitude", "longitude"), own, "has it, or have the axes, another unit or sense"),
+        (("psi", "course", "u", "v", "r"), every, "are they exchanged"),
+    ):
+        usual = min(kinds, key=lambda one: float(np.median(kinds[one])), default="")
+        best = [min(kinds, key=lambda one: kinds[one][place]) for place in range(len(sure))]
+        least = np.array([kinds[one][place] for place, one in enumerate(best)])
+        odd = np.flatnonzero((kinds.get(usual, least) > CLEAR * least + APART) & (least < SETTINGS.poor))
+        if len(odd):
+            words = (
+                f"{{}} the track keeps to {best[odd[0]]}, elsewhere to {usual}: {remedy} there? Then import it alone"
+            )
+            yield about, words, [sure[place] for place in odd]
+
+
+def _sense_in_words(unit: str, sense: Sense | None) -> str:
+    side = "starboard" if sense is None or sense.sign > 0 else "port"
+    return f"in {unit}" + (f" to {side} from {WAYS[sense.quarter % 4]}" if sense else "")
 
 
 def _other_senses(state: State, parts: list[Windows], edges: list[int]) -> Iterator[Change]:

@@ -15,18 +15,13 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.dates import (
-    DAY,
     DAY_OF,
     DAY_OF_EXCEL,
     LAST_DATE,
-    MOMENT,
     NEXT_DAY,
     TIME_OF_DAY,
     are_in_one_number,
-    day_readings,
     days_with_marks,
-    format_date,
-    join_date_and_time,
     parse_dates,
 )
 from shipid.logs.formats import Format
@@ -225,25 +220,6 @@ def _read_clock(
     return keys, check_times(table, t, clock, file, "clock")
 
 
-def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
-    """Yield questions on dates at t (N,) [s] that may mean another moment."""
-    if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
-        excel, other = (format_date(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
-        yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
-    if clock["unit"] != "date" or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
-        return
-    texts = column_called(table, clock["from"])
-    texts = join_date_and_time(column_called(table, clock["date"]), texts) if "date" in clock else texts
-    days = texts.astype(str).str.strip().str.extract(MOMENT)[0].dropna()
-    firsts = sorted(
-        {format_date(days[0])[:10] for days in day_readings(days) if np.isfinite(days[:1]).any()}
-        - {format_date(t[0])[:10]}
-    )
-    if firsts:
-        read = f"{texts.iloc[0]!r} is read as {format_date(t[0])[:10]}"
-        yield f"{read}: or is it {' or '.join(firsts)}? Then write 2024-05-14"
-
-
 def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
     """Yield a question for each further clock that goes otherwise than the times t (N,) [s] of the rows."""
     of_rows = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
@@ -280,7 +256,7 @@ def _date_column(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
 
 def is_clock(name: str) -> bool:
     """Whether a column has the name of a clock."""
-    parts = set(name_parts(name)) | {name_without_unit(name)}
+    parts = {*name_parts(name)}
     return bool(parts & CLOCK_WORDS) and not parts & NO_CLOCK_WORDS
 
 
@@ -391,8 +367,3 @@ def _nearly_rises(values: Array) -> bool:
     """Whether a column (N,) rises but for a few rows that are lost or go back, as a clock with a fault does."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps) > FEWEST * len(values) and np.mean(steps > 0) > NEARLY)
-
-
-def name_without_unit(name: str) -> str:
-    """A name in lower case without its unit in brackets."""
-    return re.sub(r"[\[(].*", "", name).strip().lower().replace(" ", "_").replace("-", "_")

@@ -22,6 +22,7 @@ from shipid.logs.guess.words import (
     name_parts,
     shaft_unit,
     side_in_name,
+    unit_in_name,
     units_in_name,
 )
 from shipid.logs.mapping import UNITS
@@ -78,16 +79,6 @@ class Question:
     sentence: str
 
 
-def unit_in_name(name: str, si: str) -> str | None:
-    """The unit in a name, in brackets or at its end; None if there is none that converts to the SI unit `si`."""
-    return _unit_and_factor(name, si)[0]
-
-
-def factor_in_name(name: str) -> float:
-    """What the prefix of a unit in a name multiplies it by, 1000 of `Engine [krpm]`; 1 where there is none."""
-    return next((factor for si in ("rad", "rad/s", "rev/s") if (factor := _unit_and_factor(name, si)[1]) != 1.0), 1.0)
-
-
 def unknown_unit(name: str) -> str:
     """What a name has in brackets where it looks like a unit and is none known here; empty where it does not."""
     for text in map(str.strip, units_in_name(name)):
@@ -96,26 +87,6 @@ def unknown_unit(name: str) -> str:
         if not known and (short or re.search(r"\w[/^]\w", text)):
             return text
     return ""
-
-
-def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
-    inside = units_in_name(name)
-    bare = re.sub(r"[\[(].*", "", name).strip()
-    parts = [part for part in re.split(r"[_ ]|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", bare) if part]
-    alone = len(parts) < 2 and si != "rev/s"
-    ends = [] if alone else ["_".join(parts[-2:]), *parts[-1:]]
-    if si == "rev/s" and not inside and re.search("rpm|rps", bare.lower()):
-        ends.append("rpm" if "rpm" in bare.lower() else "rps")
-        ends = ["krpm"] if re.search("(?<![a-z])krpm", bare.lower()) else ends
-    if si in ("N", "N m") and (force := re.search(r"[kK]?N[mM]?$", bare)):  # `thrust_kN` is cut before the N
-        ends = [force[0]]
-    for candidate, factor in map(without_prefix, [*reversed(inside), *ends]):
-        for unit, expected in UNIT_WORDS.items():
-            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(
-                expected, candidate.strip().lower()
-            ):
-                return unit, factor
-    return None, 1.0
 
 
 def unit_of_another(name: str, meaning: str) -> str | None:
@@ -170,7 +141,6 @@ class State:
     another. sides : letters that columns beside positions hold. negated : columns whose sign is turned.
     words : columns of words, with their first. other : columns that cannot be read, and why.
     commands : of the vessel, where it is known. turning : column that steers -> sign that turns the ship to starboard.
-    astern : whether the ship goes astern nearly always.
     position, psi : north + i east [m], heading [rad]; from `choose_pose` on. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -193,7 +163,6 @@ class State:
     questions: list[Question] = field(default_factory=list)
     commands: tuple[str, ...] = ()
     turning: dict[str, float] = field(default_factory=dict)
-    astern: bool = False
     position: Complex = field(init=False)
     psi: Array = field(init=False)
     r: Array | None = None
@@ -251,6 +220,11 @@ class State:
         if not chosen and meaning in OF_POSE:
             return [name for name in names if meaning_scores(may_be_measured(name)).get(meaning, 0.0) > STRONG]
         return sorted(chosen, key=lambda name: -scores[name])
+
+    def movable(self, meaning: str) -> list[str]:
+        """The free columns that vary, and have no unit that this meaning cannot have; a word is no hindrance."""
+        free = [name for name in self.free() if np.ptp(self.columns[name]) > 0]
+        return [name for name in free if unit_of_another(name, meaning) is None]
 
     def eligible(self, *meanings: str) -> list[str]:
         """The free columns that may have one of these meanings, or any: they vary, and no name says otherwise."""

@@ -11,7 +11,7 @@ import numpy as np
 from shipid.data.dataset import Array
 from shipid.logs.frames import may_wrap
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.clues import LIKELY, STRONG, State, unit_of_another
 from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import (
     ORDERS,
@@ -23,6 +23,7 @@ from shipid.logs.guess.words import (
     name_parts,
     number_in_name,
     side_in_name,
+    unit_in_name,
     units_in_name,
 )
 from shipid.logs.mapping import UNITS, to_si
@@ -113,19 +114,13 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
     extra: dict[str, Any] = {"wrap": True} if turned else {}
     effect = state.effect(r, state.columns[name])
     top = float(np.abs(state.columns[name]).max())
-    astern = state.astern and signal == "delta"
     confidence = 0.5 if sure else 0.4
     why = "by its name; it is not seen to turn the ship, so that its sign is not known"
     seen = abs(effect) > SETTINGS.seen
     if seen:
-        effect = -effect if astern else effect
         state.turning[name] = float(np.sign(effect))
         sides = ("starboard", "port") if effect > 0 else ("port", "starboard")
-        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} (t value {abs(effect):.0f}"
-        why += ", the other way astern)" if state.astern else ")"
-        if astern:
-            words = f"the ship goes astern, and a rudder is taken to turn it the other way there: is {name!r}"
-            state.ask((signal,), f"{words} positive to {sides[0]}?")
+        confidence, why = 0.95 if sure else 0.55, f"positive turns the ship to {sides[0]} (t value {abs(effect):.0f})"
     share = _ask_for_share(state, name, signal, unit)
     unsided = signal == "delta" and not turned and not share and _is_unsided(state, name, r)
     if unsided:
@@ -186,7 +181,7 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
 def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
     """Ask where an azimuth angle is about half a turn while the ship goes ahead: it may say where the water goes."""
     turn = to_si(unit, "x.alpha")
-    astern = state.astern or any(np.mean(state.columns[one] < 0) > 0.5 for one in state.called("n"))
+    astern = any(np.mean(state.columns[one] < 0) > 0.5 for one in state.called("n"))
     if not astern and np.mean(np.cos(turn * state.columns[name])) <= -0.5:
         words = f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
         half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from shipid import document
-from shipid.data.dataset import Array, Dataset
+from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
@@ -21,7 +20,6 @@ from shipid.logs.mapping import source_columns, to_si
 if TYPE_CHECKING:
     from shipid.identification.diagnosis import Diagnosis
 
-OFFSET = 0.02  # rad: less is no finding
 CAUSES = {
     "lever arm position": "lever arm",
     "sensor r scale": "factor",
@@ -32,8 +30,6 @@ CAUSES = {
 OTHER = {"position": "velocity", "velocity": "position", "heading": "yaw rate", "yaw rate": "heading"}
 """Signal that may be late -> the one that it is compared with."""
 TURNED_TRACK = np.radians(0.5)  # of a track against velocities, at least
-CLEAR = 0.008  # rad: standard error of a heading that is off, at most
-ONE_WAY = 0.9  # length of the mean of all directions, at most, of a ship on many courses
 TURN_SHOWS, SEVERAL = np.radians(6.0), 40  # of the heading in a window in which the ship turns; windows at least
 EQUAL, MOST = np.radians(0.52), 0.9  # drift of a heading in whole degrees that is the course; share of the windows
 STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual there
@@ -75,7 +71,6 @@ def defects_of_motion(state: State) -> None:
             state.find(CAUSES[found.cause], (), sure, seen, repair)
         found = found.next
     _report_position_jumps(state)
-    _report_heading_offset(state)
 
 
 def _ask_if_course(state: State, body: Complex) -> None:
@@ -120,13 +115,6 @@ def _diagnose_motion(state: State) -> Diagnosis | None:
         return None
 
 
-def _jackknife_error(design: Array, values: Array, rows: NDArray[np.intp]) -> float:
-    """Standard error of the first coefficient of a fit to some rows: the scatter without each of ten parts of them."""
-    others = [np.setdiff1d(rows, part) for part in np.array_split(rows, 10)]
-    without = [np.linalg.lstsq(design[kept], values[kept], rcond=None)[0][0] for kept in others]
-    return float(np.std(without) * np.sqrt(len(without) - 1))
-
-
 def _report_position_jumps(state: State) -> None:
     """Report where positions leave the integral of the velocities, or of their own usual steps, for good."""
     t, steps = state.t, pd.Series(np.diff(state.t))
@@ -148,39 +136,3 @@ def _report_position_jumps(state: State) -> None:
         spans, most = [(a, b) for a, b, _ in places], max(size for *_, size in places)
         words = f"the position jumps by up to {most:.0f} m and does not come back {places_in_words(state, t, spans)}"
         state.find("position jumps", (), 0.9, words, break_repair(state, t, spans))
-
-
-def _report_heading_offset(state: State) -> None:
-    angle, error, current = _off_on_all_courses(state)
-    if error < CLEAR and np.pi / 4 > abs(angle) > max(OFFSET, 3 * error):  # of more it is a drift, or another zero
-        why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
-        why += f", beside a steady current of {abs(current):.2g} m/s: heading off, positions in turned axes, or wind"
-        repair = {"kind": "heading_offset", "offset": round(angle, 4), "unit": "rad"}
-        state.find("heading offset", ("psi",), 0.6, why, repair)
-
-
-def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
-    """How far the heading is off [rad], its standard error, and a steady current, north + i east [m/s].
-
-    Over each window: way across the heading = tan(off) * (way along it) + arm * (turn) + (current across).
-    """
-    span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    psi = state.chosen.change(evidence.integrate_rate(state.t, state.psi)).real / span
-    north = np.exp(-1j * psi)
-    if state.body is None:
-        ran = state.chosen.change(state.position) / span * north
-    else:
-        ran = state.chosen.change(evidence.integrate_rate(state.t, state.body)) / span
-    ran = -ran if state.astern else ran
-    columns = (ran.real, state.chosen.change(state.psi).real / span, north.imag, north.real)
-    design = np.stack(columns, axis=1)
-    keep = np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90)
-    for _ in range(2):
-        if keep.sum() < 40 or abs(complex(np.mean(north[keep]))) > ONE_WAY:  # across one course a current is no less
-            return 0.0, np.inf, 0j
-        found = np.linalg.lstsq(design[keep], ran.imag[keep], rcond=None)[0]
-        miss = np.abs(ran.imag - design @ found)
-        keep &= miss <= 6.0 * np.median(miss[keep]) + 1e-9
-    error = _jackknife_error(design, ran.imag, np.flatnonzero(keep))
-    off = float(np.arctan(found[0]))
-    return off, error, complex(found[2], found[3]) * np.cos(off) * np.exp(1j * off)

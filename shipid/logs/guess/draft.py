@@ -71,7 +71,7 @@ def draft_text(guess: Guess) -> str:
 
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
     """The manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
-    whole = mapping.model_copy(update={"segment": (), "resample": None})
+    whole = mapping.model_copy(update={"segment": ()})
     unit = to_si(mapping.clock.unit, "t")
     return cutting.find_manoeuvres(import_log(whole, log), unit, files=mapping.source.runs is not None)
 

@@ -19,7 +19,8 @@ POSITIONS = ("latitude", "longitude", "north", "east")
 SPIKY = ("speed", "course", "u", "v", "r", "psi", "phi", "theta", "V_w")
 OF_POSITIONS = {"kind": "despike", "columns": ["north", "east"], "window": 10.0, "threshold": 10.0, "unit": "m"}
 FEW = 4  # times that a sentence names
-FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix; 0 of all else
+FILLS = (0.0, 90.0, -90.0, 180.0, -180.0)  # deg: what receivers write without a fix
+NOTHING = (0.0, -1.0)  # what is written for no speed and no direction
 NO_PLACE, HALF, AWAY = 0.01, 0.5, 18.0  # deg, share of a usual speed, part of a turn: rows about a fill are farther
 MOST_FILLS, BRIEF, SLOWEST_ROWS = 0.5, 20.0, 2.0  # share of the rows; s: of a speed that is a spike; from row to row
 SURE = 0.9  # that it is no value
@@ -56,7 +57,7 @@ def take_fills(state: State) -> None:
         )
         spans = [
             (int(a), int(b))
-            for fill in (FILLS if place else FILLS[:1])
+            for fill in (FILLS if place else NOTHING)
             for a, b in evidence.row_spans(values == fill)
             if all(min(off := abs(values[row] - fill), turn - off) > least for row in (a - 1, b) if 0 <= row < len(t))
             and (place or (step <= SLOWEST_ROWS and a > 0 and b < len(t) and t[b] - t[a - 1] < (b - a + 2) * step))

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import DataError
-from shipid.logs.amounts import is_amount
 from shipid.logs.dates import DAY_OF, TIME_OF_DAY
 from shipid.logs.foreign import foreign_format
 from shipid.logs.formats import LOOKED_AT, SheetFormat
@@ -24,7 +23,7 @@ from shipid.logs.guess.words import NO_VALUE, known_words, meaning_scores
 from shipid.logs.importing import distinct_names
 from shipid.logs.mapping import is_position
 from shipid.logs.nmea import is_nmea
-from shipid.logs.readers import READERS, grouped_number, refuse_power_cut
+from shipid.logs.readers import READERS, grouped_number
 from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_with_values
 from shipid.plugins import describe_error, log_warning
 from shipid.users import is_user_code
@@ -34,7 +33,6 @@ SEPARATORS = (",", ";", "\t", "|", "whitespace")
 GROUPS = (",", ".", "'", "’", " ", "\u00a0", "\u202f")  # marks of thousands
 MARKS = ("#", "##", "%", "%%", "//")  # before a header that is written as a comment
 MOST_HEADS = 3  # lines above the data: names in two, and units
-WIDE = 0.9  # share of every second byte that is 0, in text of two bytes a character
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 NUMERIC = 0.8  # share of the cells of a line of data that are numbers
 _UNIT = re.compile(
@@ -98,12 +96,9 @@ def _has_clock(lines: str) -> bool:
 def _guess_encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    for order, zeros, others in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
-        if zeros.count(b"\0") > WIDE * len(zeros) and b"\0" not in others:  # without the mark of its order
-            return order
     if b"\0" in head:
-        refuse_power_cut(head, file)
-        raise DataError("a binary file of unknown format: export it as text, Parquet, .mat or NMEA", file=file)
+        message = "a binary file of unknown format, or text with NUL bytes as after a power cut: export it as text"
+        raise DataError(message, file=file)
     utf8 = "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "utf-8"
     if _is_encoded(head, utf8):
         return utf8
@@ -128,7 +123,10 @@ def _text_format(
         check_width(len(line.split()) if sign == "whitespace" else line.count(sign) + 1, file)
     score, separator, decimal, mark = _guess_marks(lines, separators)
     if score < NUMERIC / 2:
-        raise DataError("no table of numbers with any separator: export it as CSV, a row for each time", file=file)
+        raise DataError(
+            "no table of numbers with any separator: export it as CSV, a row for each time, no unit behind a number",
+            file=file,
+        )
     rows = [split_cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
     places = _places_of_numbers([row for row in rows if len(row) == width], decimal, mark)
@@ -283,5 +281,5 @@ def _number_share(row: Iterable[str], decimal: str, thousands: str | None = None
     grouped = re.compile(grouped_number(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
     cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
-    known = [bool(_NUMBER.fullmatch(cell)) or is_amount(cell) or is_position(cell) for cell in cells]
+    known = [bool(_NUMBER.fullmatch(cell)) or is_position(cell) for cell in cells]
     return sum(known) / len(known) if known else 0.0

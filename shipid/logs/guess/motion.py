@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, si_unit, unit_in_name
+from shipid.logs.guess.clues import STRONG, State, si_unit
 from shipid.logs.guess.evidence import Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
@@ -22,12 +21,11 @@ from shipid.logs.guess.search import (
     Velocity,
     length_unit,
     local_plane,
-    rates_of_ais,
     search_motion,
 )
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores
-from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
+from shipid.logs.guess.words import is_magnetic, may_be_measured, meaning_scores, unit_in_name
+from shipid.logs.mapping import UNITS, to_si
 from shipid.physics.signals import signal_of
 from shipid.units import GRAVITY
 
@@ -100,11 +98,7 @@ def _report_axes(state: State, best: MotionReading, sources: tuple[str, str], se
     """Note axes and a heading that count otherwise than usual, and ask where another reading is nearly as likely."""
     pose, axes = best.pose, best.axes
     agreement = 1.0 - pose.misfit
-    if pose.astern:
-        state.astern = True
-        said = "course and heading differ by about 180 deg: the ship goes astern, as shafts or velocities say"
-        state.find("astern", (pose.heading,), 0.8, said)
-    elif sense.quarter == 2 and sense.sign > 0:
+    if sense.quarter == 2 and sense.sign > 0:
         said = f"does the ship go astern, or has {pose.heading!r} another zero? If it goes astern, take the offset out"
         state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {said}")
     if (axes != Axes() or sense != Sense()) and not best.settled.startswith("--"):
@@ -153,6 +147,7 @@ def _ask_about_names(state: State, best: MotionReading) -> None:
     """Ask about what names say of position and heading: a magnetic compass, set points, no agreement."""
     pose = best.pose
     first, second = pose.place.first, pose.place.second
+    state.ask_for_unit("psi", pose.heading, pose.unit)
     if is_magnetic(pose.heading):
         words = f"{pose.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
         state.ask(("psi", "v"), f"{words} A `heading_offset` is one for all courses")
@@ -234,32 +229,21 @@ def _suggest_two(state: State, best: MotionReading, found: Velocity, unit: str, 
 
 
 def _unit_of_speed(state: State, fit: Fit, sources: tuple[str, ...], quiet: bool) -> tuple[str, float]:
-    """The likeliest unit by the scale and the name, and the part of it that is counted; another clock is asked."""
+    """The likeliest unit by the scale and the name, and the part of it that is counted."""
     name = sources[0]
     written = unit_in_name(name, "m/s")
     whole = quiet and float(np.mean(state.columns[name] % 1 == 0)) > 0.1
-    now = DAY if is_dated(state.clock_unit) else to_si(state.clock_unit, "t")
-    clocks = {state.clock_unit: 1.0}
-    if state.clock_unit != "date":
-        clocks |= {unit: factor / now for unit, factor in UNITS["s"].items() if not is_dated(unit) and factor != now}
-    costs: dict[tuple[str, float, str], float] = {}
+    costs: dict[tuple[str, float], float] = {}
     for unit, factor in UNITS["m/s"].items():
         for part in (1.0, *KNOTS) if unit == "kn" and whole else (1.0,):
-            for clock, times in clocks.items():
-                usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.odd
-                cost = (0.0 if written == unit else SETTINGS.odd + 2.0) if written else usual
-                cost += SETTINGS.usual_unit * (part != 1.0) + SETTINGS.odd * (times != 1.0)
-                off = np.log(fit.scale / (factor * part * times)) / (SETTINGS.off_unit if times == 1.0 else 0.02)
-                costs[unit, part, clock] = float(cost + off**2 / 2)
-    ranked = sorted(costs, key=costs.__getitem__)
-    unit, part, clock = ranked[0]
-    if costs[ranked[0]] > 20.0:  # a factor of no unit
+            usual = SETTINGS.usual_unit * (unit != "m/s") if unit in PLAIN else SETTINGS.odd
+            cost = (0.0 if written == unit else SETTINGS.odd + 2.0) if written else usual
+            off = np.log(fit.scale / (factor * part)) / SETTINGS.off_unit
+            costs[unit, part] = float(cost + SETTINGS.usual_unit * (part != 1.0) + off**2 / 2)
+    best = min(costs, key=costs.__getitem__)
+    if costs[best] > 20.0:  # a factor of no unit
         return written or ("kn" if name in state.scaled else "m/s"), 1.0
-    rivals = [one for one in ranked[1:] if costs[one] <= costs[ranked[0]] + SETTINGS.close and one[2] != clock]
-    for other_unit, _, other in [ranked[0]] if clock != state.clock_unit else rivals[:1]:
-        words = f"is the clock in {other}, with {name!r} in {other_unit}? The draft says {state.clock_unit}"
-        state.ask(("t", "u", "v", "speed"), f"{words}: the track is {fit.scale:.4g} times the integral of {name!r}")
-    return unit, part
+    return best
 
 
 def _report_factor(state: State, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...]) -> None:
@@ -294,14 +278,6 @@ def _take_rate(state: State, best: MotionReading) -> None:
             state.find("yaw rate does not fit", (free[0],), 0.6, words)
         return
     name, unit, fit = found.name, found.unit, found.fit
-    if unit == "ais" and (rates := rates_of_ais(state, name)) is not None:
-        missing = int(np.isnan(rate_of_ais(state.columns[name])).sum())
-        state.columns[name], state.units[name] = rates, "ais"
-        words = f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min"
-        state.find("unit of r", (name,), 0.9, words)
-        if missing:
-            words = f"{name!r} is 127, -127 or -128 in {missing} rows, with which AIS says no rate"
-            state.find("missing values", (name,), 0.95, words)
     sign = (1 if fit.scale > 0 else -1) * best.axes.hand
     confidence = 0.99 * (1 - min(0.5, fit.left))
     why = f"integrated in {unit} it leaves {100 * fit.left:.2g} % of the heading's change unexplained"
@@ -333,6 +309,9 @@ def report_misnomers(state: State) -> None:
         usual = written or ("m/s" if rare else one.unit)
         if max(scores.get(name, 0.0) for name in names) < 0.45 and one.confidence > 0.5:
             state.find("other name", (one.source,), one.confidence, f"{one.source!r} is {one.name}: {one.evidence}")
+            if signal in ("u", "v", "r") and max(scores.values(), default=0.0) >= STRONG:
+                words = f"is {one.source!r} {one.name}? By its name it is another quantity, by the motion it is this"
+                state.ask((signal,), words)
         if one.unit != usual and written != "%":
             says = f"its name says {written}" if written else "nothing says so"
             state.find("other unit", (one.source,), one.confidence, f"{one.source!r} is in {one.unit}, and {says}")

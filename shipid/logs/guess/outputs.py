@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
+from shipid.logs.guess.clues import STRONG, State, unit_of_another
 from shipid.logs.guess.commands import unique_name
-from shipid.logs.guess.words import is_order, meaning_scores, name_parts, side_in_name
+from shipid.logs.guess.words import is_order, meaning_scores, name_parts, side_in_name, unit_in_name
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, rows_of_role, signal_of
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
-from shipid.logs.guess.clues import State, factor_in_name, unit_in_name
+from shipid.logs.guess.clues import State
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import meaning_scores, units_in_name
+from shipid.logs.guess.words import factor_in_name, unit_in_name, units_in_name
 from shipid.logs.mapping import UNITS, degrees_and_minutes
 from shipid.units import DEGREE
 
@@ -18,15 +18,6 @@ TURNS = {400.0: "gon", 3600.0: "tenths of a degree", 36000.0: "hundredths of a d
 """A whole turn in other numbers -> what they are."""
 KNOTS = {0.1: "tenths of a knot", 0.01: "hundredths of a knot"}
 """Part of a knot that AIS (ITU-R M.1371) and receivers write as whole numbers -> its name."""
-_TURN_WORDS = {
-    400.0: r"gons?|gradians?|neugrad|grades?|centesimal(es|i)?",
-    3600.0: r"0[.,]1 ?(deg|°)|1/10 ?(deg|°)|(deg|°) ?[*x] ?10|deg_?e-?1",
-    36000.0: r"0[.,]01 ?(deg|°)|1/100 ?(deg|°)|(deg|°) ?[*x] ?100|deg_?e-?2",
-}
-_KNOT_WORDS = {
-    0.1: r"(1/10|0[.,]1|d) ?(kn|kts?|knots?)|(kn|kts?|knots?) ?[*x/] ?10",
-    0.01: r"(1/100|0[.,]01|c) ?(kn|kts?|knots?)|(kn|kts?|knots?) ?[*x/] ?100",
-}
 _PLACE_PARTS = {
     1 / 60: ("minutes of arc", r"(arc)? ?min(ute)?s?|['′]"),
     1 / 3600: ("seconds of arc", r"(arc)? ?sec(ond)?s?|[\"″]|as"),
@@ -41,20 +32,10 @@ _PLACE_PARTS = {
 
 
 def take_scales(state: State) -> None:
-    """Put into degrees and knots, in place, what names and jumps say is in other numbers; the draft has the factors."""
-    for name, values in state.columns.items():
-        scores = meaning_scores(name)
-        best = max(scores, key=lambda one: scores[one], default="")
+    """Put into degrees, in place, positions that are in other numbers, and what has a prefix before its unit."""
+    for name in [*state.columns]:
         if (factor := factor_in_name(name)) != 1.0:
             set_scale(state, name, factor, f"its unit has a prefix: times {factor:g}")
-        elif best in ("psi", "course", "alpha", "beta_w", "delta", "phi", "theta"):
-            turn = _key_in_unit(name, _TURN_WORDS)
-            if turn is None and best not in ("delta", "phi", "theta", "psi"):
-                turn = turn_of_jumps(values)
-            if turn in TURNS:
-                set_scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
-        elif best == "speed" and (part := _key_in_unit(name, _KNOT_WORDS)) is not None:
-            set_scale(state, name, part, f"whole numbers of {KNOTS[part]}")
     pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude")]
     if pairs:
         _take_positions(state, *pairs[0])
@@ -77,13 +58,11 @@ def set_scale(state: State, name: str, factor: float, why: str) -> None:
         state.spikes[name] = rows, size * factor
 
 
-def _key_in_unit(name: str, words: dict[float, str]) -> float | None:
-    """The key whose words a name has as a unit, in brackets or at its end."""
+def _has_unit(name: str, words: str) -> bool:
+    """Whether a name has these words as a unit, in brackets or at its end."""
     last = re.split(r"[_ ]", name.strip())[-1]
     said = [*units_in_name(name), *([last] if last != name.strip() else [])]
-    return next(
-        (key for key, one in words.items() if any(re.fullmatch(one, text.strip().lower()) for text in said)), None
-    )
+    return any(re.fullmatch(words, text.strip().lower()) for text in said)
 
 
 def _take_positions(state: State, north: str, east: str) -> None:
@@ -119,7 +98,7 @@ def _places_in_degrees(state: State, north: str, east: str) -> dict[str, tuple[t
     if np.abs(a).max() > 90 and np.abs(a).max() < 9000 and all(np.all(np.abs(one) % 100 < 60) for one in (a, b)):
         found["ddmm"] = ((degrees_and_minutes(a), degrees_and_minutes(b)), 0.0)
     for part, (what, words) in _PLACE_PARTS.items():
-        said = words != "" and _key_in_unit(north, {part: words}) == part == _key_in_unit(east, {part: words})
+        said = words != "" and _has_unit(north, words) and _has_unit(east, words)
         counted = part < 1e-5 and all(np.mean(one % 1 == 0) > 0.1 and np.abs(one).max() > 1e6 for one in (a, b))
         if said or counted:
             usual = 0.0 if part == 1e-7 else SETTINGS.usual_unit

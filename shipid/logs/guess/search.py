@@ -16,19 +16,19 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from pymap3d import geodetic2ned
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.amounts import is_amount
 from shipid.logs.frames import PARALLEL, meridian_convergence
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import State, names_another, unit_in_name
+from shipid.logs.guess.clues import State, names_another
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.scales import TURNS, turn_of_jumps
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores, name_parts
-from shipid.logs.mapping import UNITS, rate_of_ais, to_si
+from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores, name_parts, unit_in_name
+from shipid.logs.mapping import UNITS, to_si
 from shipid.physics.signals import rows_of_role
 
 Frame = Literal["ned", "enu", "zup", "ros"]
@@ -41,6 +41,7 @@ OTHER_WAY = frozenset("w west ouest oeste vest south sud sur syd zuid".split())
 YAW = frozenset(["yaw", "theta"])
 MOST_COLUMNS, MOST_WINDOWS = 24, 400  # that are tried where no name helps; in the first ranking
 PLAIN = ("m/s", "kn", "km/h")  # units of speed that logs usually have
+VELOCITIES = ("u", "v", "velocity_north", "velocity_east")
 WAYS = ("north", "east", "south", "west")
 
 
@@ -106,7 +107,7 @@ class Place:
 class Pose:
     """A hypothesis of position and heading: a whole `turn` of the heading in its unit, its sense in the plane.
 
-    misfit : 1 - mean cosine of the angle between track and heading. astern : the heading points against the track.
+    misfit : 1 - mean cosine of the angle between track and heading.
     """
 
     place: Place
@@ -115,7 +116,6 @@ class Pose:
     sense: Sense
     misfit: float
     cost: float
-    astern: bool = False
 
     @property
     def unit(self) -> str:
@@ -187,7 +187,6 @@ def search_motion(state: State, file: Path, frame: Frame | None = None) -> list[
     if not poses or (poses[0].misfit > SETTINGS.poor and not (places and headings)):
         raise DataError(_what_is_missing(state, bool(places)), file=file)
     kept = [one for one in poses if one.cost < poses[0].cost + 6.0][: SETTINGS.beam]
-    kept += [_as_astern(state, one) for one in kept if one.misfit < SETTINGS.named_left]
     motions = [motion for pose in kept if (motion := _motion_of_pose(state, pose, frame)) is not None]
     if not motions:
         best = poses[0]
@@ -272,7 +271,9 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
             alike = ranked[1][0] < 2.0 * max(ranked[0][0], 1e-9) or spread < SETTINGS.spread
             if ranked[0][0] > SETTINGS.poor:  # a ship that drifts far: any sense that is not against the track
                 ranked += [
-                    one for one in _all_senses(track, way) if one[0] < 1.0 and one[1] not in dict(ranked).values()
+                    one
+                    for one in senses_by_quarters(track, way)
+                    if one[0] < 1.0 and one[1] not in dict(ranked).values()
                 ]
             for misfit, sense in ranked if alike else ranked[:1]:
                 across = SETTINGS.quarter * (sense.sign > 0 and sense.quarter != 0)
@@ -290,7 +291,7 @@ def senses_of_angle(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     return sorted(senses, key=lambda one: one[0])
 
 
-def _all_senses(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
+def senses_by_quarters(track: Complex, way: Complex) -> list[tuple[float, Sense]]:
     """All senses of an angle, exp(i angle) (W,), in the plane of a track (W,), with their misfits."""
     return [
         (1.0 - (mean * np.exp(-0.5j * np.pi * one)).real, Sense(sign, one))
@@ -328,14 +329,6 @@ def _angle(state: State, name: str, turn: float) -> Array:
 
 def _plane_heading(state: State, pose: Pose) -> Array:
     return pose.sense.direction(_angle(state, pose.heading, pose.turn))
-
-
-def _as_astern(state: State, pose: Pose) -> Pose:
-    """The same of a ship that goes astern all the time: its heading points against the track."""
-    shafts = [state.columns[name][state.columns[name] != 0.0] for name in state.called("n")]
-    back = any(len(one) and np.mean(one < 0.0) > SETTINGS.astern for one in shafts)
-    sense = Sense(pose.sense.sign, (pose.sense.quarter + 3) % 4 - 1)
-    return replace(pose, sense=sense, astern=True, cost=pose.cost + (1.0 if back else SETTINGS.rare))
 
 
 def _motion_of_pose(state: State, pose: Pose, frame: str | None) -> MotionReading | None:
@@ -479,12 +472,19 @@ def _is_compass(name: str) -> bool:
 def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) -> Iterator[Velocity]:
     """Yield pairs of columns whose integral is the track: velocities of the Earth or of the ship, speed and course."""
     turn, used = np.exp(1j * theta), {pose.place.first, pose.place.second, pose.heading}
+    plain = {*state.eligible(*VELOCITIES)}  # no word of their names says another quantity
+    steady = {
+        kind: _left_by_constant(state, seen, way) for kind, way in (("earth", np.ones_like(turn)), ("body", turn))
+    }
     for one in [*_pairs_of_velocities(state, used, seen, turn), *_speeds_and_courses(state, used, seen)]:
         fit = _fit_of_path(state, seen, one.ground)
         sure, usual = one.named >= (0.75 if one.kind == "course" else 0.45), _is_speed_unit(fit.scale)
-        if fit.scale <= 0 or not (sure or usual) or fit.left > (SETTINGS.named_left if sure else SETTINGS.left):
+        against = one.kind != "course" and not {one.first, one.second} <= plain
+        limit = SETTINGS.left * steady[one.kind] if against else SETTINGS.named_left if sure else SETTINGS.left
+        if fit.scale <= 0 or not (sure or usual) or fit.left > limit:
             continue
         cost = one.cost + float(np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + one.named))) + (not usual)
+        cost += SETTINGS.odd * against
         unsure, drift = False, _drift_in_turns(state, one.ground, theta)
         if one.kind == "body":  # against its mirror image, by the track, and by a ship's drift out of its turns
             mirror = _fit_of_path(state, seen, np.conj(one.ground / turn) * turn)
@@ -492,10 +492,18 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
             cost += max(by_track, 0.0) - float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)
             cost += 0.1 * (one.side != pose.sense.sign)
             unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
-        elif one.kind == "course" and drift > 0.5 and not pose.astern:
+            if against and by_track > -SETTINGS.alike_left:
+                continue  # the second says nothing of the track
+        elif one.kind == "course" and drift > 0.5:
             ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
             unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left
         yield replace(one, fit=fit, cost=cost, unsure=unsure)
+
+
+def _left_by_constant(state: State, seen: Complex, way: NDArray[np.generic]) -> float:
+    """Share of a motion (W,) that a constant velocity or rate along a way (N,) leaves, as any still column is one."""
+    ran = state.chosen.change(evidence.integrate_rate(state.t, way))
+    return 1.0 - abs(np.vdot(ran, seen)) ** 2 / max(float(np.vdot(ran, ran).real * np.vdot(seen, seen).real), 1e-300)
 
 
 def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
@@ -503,24 +511,26 @@ def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
     return evidence.fit_without_outliers(seen, state.chosen.change(evidence.integrate_rate(state.t, ground)))
 
 
-def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Complex) -> list[Velocity]:
-    """The pairs of columns that may be velocities of the Earth or of the ship, by name and by a rough fit."""
-    words = ("u", "v", "velocity_north", "velocity_east")
-    named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
-    free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:MOST_COLUMNS]
-    total, found = float(np.sum(np.abs(seen) ** 2)), list[tuple[float, Velocity]]()
-    for kind, way in (("earth", np.ones_like(turn)), ("body", turn)):
-        paths = {one: evidence.integrate_rate(state.t, state.columns[one] * way) for one in free if one not in used}
-        changes = {name: state.chosen.change(path) for name, path in paths.items()}
-        for (first, a), (second, b), side in product(changes.items(), changes.items(), (1, -1)):
-            ran = a + 1j * side * b
-            cross, said = float(np.real(np.vdot(ran, seen))), _names_of_velocities(kind, first, second)
-            rough = 1.0 - cross**2 / max(float(np.sum(np.abs(ran) ** 2)) * total, 1e-300)
+def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Complex) -> Iterator[Velocity]:
+    """Yield pairs of columns that may be velocities of the Earth or of the ship, by name and by a rough fit."""
+    free = [name for name in state.movable("u") if name not in used]
+    free.sort(key=lambda name: -max(meaning_scores(name).get(word, 0.0) for word in VELOCITIES))
+    free, total, found = free[:MOST_COLUMNS], float(np.sum(np.abs(seen) ** 2)), list[tuple[float, Velocity]]()
+    ways = {"earth": np.ones_like(turn), "body": turn}
+    for kind in ways if len(free) > 1 else ():
+        paths = (evidence.integrate_rate(state.t, state.columns[one] * ways[kind]) for one in free)
+        ran = np.stack([state.chosen.change(path) for path in paths])
+        products, ahead, abeam = np.conj(ran) @ ran.T, (np.conj(ran) @ seen).real, (np.conj(ran) @ seen).imag
+        for (a, first), (b, second), side in product(enumerate(free), enumerate(free), (1, -1)):
+            cross, said = ahead[a] + side * abeam[b], _names_of_velocities(kind, first, second)
+            power = products[a, a].real + products[b, b].real - 2.0 * side * products[a, b].imag
+            rough = 1.0 - cross**2 / max(power * total, 1e-300)
             if first != second and cross > 0 and (rough < 0.9 or said >= 0.45):
-                ground = np.asarray((state.columns[first] + 1j * side * state.columns[second]) * way, np.complex128)
-                one = Velocity(kind, first, second, side, ground, said, cost=float(kind == "earth" and side < 0))
+                one = Velocity(kind, first, second, side, seen, said, cost=float(kind == "earth" and side < 0))
                 found.append((rough / (SETTINGS.unnamed + said), one))
-    return [one for _, one in sorted(found, key=lambda entry: entry[0])[:16]]
+    for _, one in sorted(found, key=lambda entry: entry[0])[:16]:
+        ground = state.columns[one.first] + 1j * one.side * state.columns[one.second]
+        yield replace(one, ground=ground * ways[one.kind])
 
 
 def _names_of_velocities(kind: str, first: str, second: str) -> float:
@@ -575,35 +585,21 @@ def _rate_hypotheses(state: State, pose: Pose, theta: Array) -> Iterator[Rate]:
     change = state.chosen.change(theta)
     if float(np.std(change)) < np.radians(0.5):
         return
+    steady = _left_by_constant(state, change, np.ones(len(state.t)))
     called, used = state.all_called("r"), {pose.place.first, pose.place.second, pose.heading}
-    others = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and not names_another(name, "r")]
-    for name in dict.fromkeys([*state.eligible("r"), *others]):
-        if name in used:
-            continue
-        for unit, values in (("", state.columns[name]), ("ais", rates_of_ais(state, name))):
-            if values is None:
-                continue
-            fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, values)))
-            scale = max(abs(fit.scale), 1e-12)
-            known = [unit] if unit else [one for one in UNITS["rad/s"] if one != "ais"]
-            unit = min(known, key=lambda one: abs(np.log(scale / UNITS["rad/s"][one])))
-            off = abs(scale / UNITS["rad/s"][unit] - 1)
-            score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
-            command = meaning_scores(name).keys() & rows_of_role("command").keys()
-            limit = SETTINGS.named_left if score else SETTINGS.left if command or is_order(name) else 0.3
-            if fit.left < limit and off < (0.35 if score else SETTINGS.left if name in others else 0.35):
-                cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off
-                yield Rate(name, unit, fit, float(cost))
-
-
-def rates_of_ais(state: State, name: str) -> Array | None:
-    """The rates (N,) of a column of the whole numbers of AIS, interpolated where these say none; None if it is none."""
-    coded = state.columns[name]
-    if unit_in_name(name, "rad/s") is not None or np.abs(coded).max() > 128 or np.mean(coded % 1 == 0) < 0.9:
-        return None
-    rates = rate_of_ais(coded)
-    known = np.isfinite(rates)
-    return np.interp(state.t, state.t[known], rates[known]) if known.sum() > 1 else None
+    for name in (name for name in state.movable("r") if name not in used):
+        fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])))
+        scale = max(abs(fit.scale), 1e-12)
+        unit = min(UNITS["rad/s"], key=lambda one: abs(np.log(scale / UNITS["rad/s"][one])))
+        off = abs(scale / UNITS["rad/s"][unit] - 1)
+        score = meaning_scores(name).get("r", 0.0) if name in called else 0.0
+        command = meaning_scores(name).keys() & rows_of_role("command").keys()
+        against = not score and names_another(name, "r")
+        limit = SETTINGS.named_left if score else SETTINGS.left if command or is_order(name) else 0.3
+        limit = SETTINGS.left * steady if against else limit
+        if fit.left < limit and off < (0.35 if score else SETTINGS.left):
+            cost = np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + score)) + off + SETTINGS.odd * against
+            yield Rate(name, unit, fit, float(cost))
 
 
 # --- positions ---
@@ -647,8 +643,7 @@ def _what_is_missing(state: State, position: bool) -> str:
         if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text) and not position:
             remedy = f"{name!r} holds {text[:40]!r}: write latitude and longitude in two columns"
         elif re.search(r"\d", text) and any(meaning_scores(name).get(one, 0.0) > 0.9 for one in asked):
-            other = "other units: write one unit" if is_amount(text) else "no number: write it as a number with a sign"
-            remedy = f"{name!r} holds {text[:40]!r}, {'and ' * is_amount(text)}{other}"
+            remedy = f"{name!r} holds {text[:40]!r}, no number: write it as a number with a sign, without a unit"
     for name, why in state.other.items():
         if any(meaning_scores(name).get(one, 0.0) > 0.6 for one in asked):
             remedy = f"{name!r} is {why}"

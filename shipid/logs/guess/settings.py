@@ -31,7 +31,7 @@ class SearchSettings:
         at that cost, 14 times off a usual way in a turn, has another unit.
     settling : cost of axes against which a course or velocities to north and east speak.
     seen : t value of an effect on the motion from which it is taken for one.
-    astern : share of the turning shaft's rows in which it turns astern, of a ship that goes astern all the time.
+    astern : share of the turning shaft's rows in which it turns astern, of a screw whose sign is the other way.
     turned : range of a heading that no name says [rad], at least.
     advance : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05).
     alike : ratio of two scales that are one.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,15 +13,13 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, split_amounts
 from shipid.logs.cells import OFF_ONE, text_numbers
-from shipid.logs.formats import LOOKED_AT, TableFormat, TextFormat
+from shipid.logs.formats import TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     are_whole,
     clock_restarts,
     clock_without_repeats,
     column_called,
-    doubts_on,
     is_clock,
     other_clocks,
 )
@@ -40,11 +37,9 @@ from shipid.logs.mapping import (
 from shipid.logs.readers import (
     LONGEST_LINE,
     READERS,
-    has_nul,
     in_points,
     parse_text,
     read_log_table,
-    refuse_power_cut,
     require_file,
 )
 
@@ -64,7 +59,6 @@ NOT_AVAILABLE = {
     "speed": {102.3: 51.0, 1023.0: 600.0},
     "latitude": {91.0: 90.0, 99.0: 90.0, 54_600_000.0: 54e6},
     "longitude": {181.0: 180.0, 108_600_000.0: 108e6},
-    "r": {-128.0: 127.0},
 }
 """Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
@@ -72,14 +66,9 @@ BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one
 QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
 """How the names of x, y, z, w of a quaternion differ; numbers begin with the scalar, as in PX4 and ArduPilot."""
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
-SHIPS, UNKNOWN = ("mmsi", "userid", "imo", "imonumber", "callsign"), ("0", "unknown")
-"""Names of columns that say the ship, in small letters alone, the surest first; what they hold for an unknown one."""
-SHIP = frozenset(
-    "ship vessel shipname vesselname shipid vesselid schiff skip skib fartyg navire buque nave schip".split()
-)
-NAMES = frozenset("name id no nr num number code names navn namn nom nombre naam".split())
-"""Words of the name of a column that says a ship, and words beside them that it may have: a ship state is no ship."""
-ROWS_EACH, MOST_NUMBERS = 5, 20  # rows of each ship, on average, at least; ships that have numbers alone, at most
+SHIPS = ("mmsi", "userid", "imo", "imonumber", "callsign", "vesselname", "shipname", "vesselid", "shipid")
+UNKNOWN = ("0", "unknown")
+"""Names of columns that say the ship, in small letters alone; what they hold for an unknown one."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +78,8 @@ class LogTable:
     form, clock : keys of [format] and [clock]. t : [s], rising. notes : sentences on columns left out.
     seams : places where rows were not read, or runs begin. runs : column that says the run, and their number, where the
     clock begins again with each. sides : letters that columns beside positions hold. words : columns of words, with
-    their first. other : columns that cannot be read, and why. doubts : questions on dates. in_parts : of several.
+    their first. other : columns that cannot be read, and why. in_parts : of several.
+    doubts : questions on other clocks.
     fillers : column -> numbers that stand for no value of it.
     """
 
@@ -133,8 +123,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         form, lines, notes = format_of_sheet(file, names)
     model = READERS[form.get("kind", "text")].options.model_validate(form)
     if isinstance(model, TextFormat):
-        if has_nul(head, model):
-            refuse_power_cut(head, file)
         sampled = size > SAMPLE
         lines = _text_sample(file, model.encoding, size)
     if isinstance(model, TableFormat):
@@ -156,7 +144,6 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     other: dict[str, str] = table.attrs.get("other", {})
     fillers: dict[str, list[float]] = {}
     _refuse_ships(table, file)
-    table, in_units, mixed = _without_units(table)
     decimal = form.get("decimal", ".")
     columns, words = _number_columns(table, decimal, form.get("thousands"))
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
@@ -176,7 +163,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         values[np.abs(values) > np.finfo(np.float32).max] = np.nan
     made = _degree_columns(columns) | _quaternion_columns(columns)
     made |= {name: ((source,), values) for name, (source, values) in in_text.items() if name != source}
-    in_parts = {name: parts for name, (parts, _) in made.items()} | in_units
+    in_parts = {name: parts for name, (parts, _) in made.items()}
     words = [name for name in words if name not in columns]
     lost = next(filter(is_clock, other), None)
     if lost is not None and not any(map(is_clock, map(str, table.columns))):
@@ -191,12 +178,10 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     notes += tuple(
         f"column {name!r} holds words, not numbers{_as_number(name, says[name])}"
         for name in words
-        if name and name not in {*named, *mixed}
+        if name and name not in named
     )
-    notes += tuple(f"column {name!r} has numbers in {units}: write one unit" for name, units in mixed.items())
     notes += () if once.all() else ("rows that repeat the row before are left out",)
     empty = [name for name, values in columns.items() if np.isnan(values).all()]
-    doubts = (*doubts_on(table.loc[once], clock, t), *_minus_ones(columns))
     return LogTable(
         form,
         clock,
@@ -208,7 +193,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         letters | _side_columns(table, words),
         says,
         other,
-        doubts if runs else (*doubts, *other_clocks(table.loc[once], columns, clock, t)),
+        () if runs else tuple(other_clocks(table.loc[once], columns, clock, t)),
         in_parts,
         fillers,
     )
@@ -240,64 +225,17 @@ def _text_sample(file: Path, encoding: str, size: int) -> str:
 
 def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
     """Raise DataError where a log holds several ships, as a column names them: the surest of these decides."""
-    columns = [*map(str, table.columns)]
-    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed(columns)}
-    name = next((names[one] for one in SHIPS if one in names), None) or next(filter(_says_ship, columns), None)
-    if name is None:
-        return
-    texts = column_called(table, name).dropna().astype(str).str.strip()
-    known = [one for one in texts.unique() if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
-    ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]
-    if _says_ship(name) and (_are_measured(ships) or len(texts) < ROWS_EACH * len(ships)):
-        return
-    if len(ships) > 1:
-        raise DataError(
-            f"holds {len(ships)} ships ({name!r} is {', '.join(ships[:3])}{', ...' * (len(ships) > 3)}): write the "
-            "rows of each ship to a separate log, or take the column out of the log if it is one ship",
-            file=file,
-        )
-
-
-def _says_ship(name: str) -> bool:
-    """Whether the name of a column says a ship, or its name or number, and nothing else of it."""
-    parts = {*name_parts(name)}
-    return bool(parts & SHIP) and parts <= SHIP | NAMES
-
-
-def _are_measured(texts: list[str]) -> bool:
-    """Whether the texts of a column are measured: one has decimals, or all are numbers, and many."""
-    numbers = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce")
-    return bool((numbers.dropna() % 1 != 0).any() or (numbers.notna().all() and len(texts) > MOST_NUMBERS))
-
-
-def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:
-    """The table without the unit behind each number, such as 12.3 kn; it is in the name then.
-
-    Also new name -> name in the log, and column -> its units in words where it has several.
-    """
-    names, result = [*map(str, table.columns)], table.copy(deep=False)
-    renamed: dict[str, tuple[str, ...]] = {}
-    mixed: dict[str, str] = {}
-    for place, name in enumerate(names):
-        column = table.iloc[:, place]
-        other = not name or {*SIDES} & meaning_scores(name).keys() or is_clock(name)
-        if other or not (column.dtype == object or pd.api.types.is_string_dtype(column.dtype)):
-            continue
-        first = column.dropna().head(LOOKED_AT).astype(str)
-        if not first.map(lambda cell: is_amount(cell.strip())).any():
-            continue
-        bare, units = split_amounts(column.fillna("").astype(str).str.strip())
-        said = [*units[units.ne("")].value_counts().index]
-        if not any(are_one(said, unit) for unit in UNIT_WORDS):
-            mixed[name] = " and ".join(map(repr, said[:3]))
-            continue
-        result.isetitem(place, bare.to_numpy(dtype=object))
-        if not units_in_name(name):
-            north = said[0] == "M" and {"psi", "course"} & meaning_scores(name).keys()
-            names[place] = f"{name} [{'deg M' if north else said[0]}]"
-            renamed[names[place]] = (name,)
-    result.columns = pd.Index(names)
-    return result, renamed, mixed
+    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed([*map(str, table.columns)])}
+    for name in (names[one] for one in SHIPS if one in names):
+        texts = column_called(table, name).dropna().astype(str).str.strip().unique()
+        known = [one for one in texts if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
+        ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]
+        if len(ships) > 1:
+            raise DataError(
+                f"holds {len(ships)} ships ({name!r} is {', '.join(ships[:3])}{', ...' * (len(ships) > 3)}): write the "
+                "rows of each ship to a separate log, or take the column out of the log if it is one ship",
+                file=file,
+            )
 
 
 def _number_columns(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:
@@ -461,20 +399,3 @@ def _is_filler(values: Array, value: float) -> bool:
     usual, many = np.abs(others), len(np.unique(others)) > LEVELS
     on_and_off = not many and np.median(usual) <= usual.max() / BEYOND
     return bool(abs(value) > (BEYOND if many else BEYOND_LEVELS) * usual.max() and not on_and_off)
-
-
-def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
-    """Yield a question for each speed, direction or shaft that is -1 and otherwise never negative, nor near it."""
-    for name, values in columns.items():
-        hit = values == -1.0
-        others = values[~hit & np.isfinite(values)]
-        if not hit.any() or len(others) < 2 or others.min() < 0.0:
-            continue
-        meant = meaning_scores(name).keys()
-        lost = bool({"speed", "V_w"} & meant and np.any(others % 1))  # whole knots may be one astern
-        lost |= bool({"psi", "course", "beta_w"} & meant and others.max() > 180.0)
-        lost |= "n" in meant and others.min() > 10.0
-        if lost:
-            span = f"{others.min():g} to {others.max():g}"
-            words = f"{name!r} is -1 in {int(hit.sum())} rows and {span} in the others"
-            yield f"{words}: is there no value? Then write missing = [-1] for it"

@@ -181,7 +181,7 @@ def _join_files(logs: list[LogTable]) -> LogTable:
         columns=columns,
         fillers=fillers,
         notes=tuple(dict.fromkeys(note for log in logs for note in log.notes)),
-        seams=sum(log.seams for log in chosen) + len(chosen) - 1,
         doubts=tuple(dict.fromkeys(doubt for log in logs for doubt in log.doubts)),
+        seams=sum(log.seams for log in chosen) + len(chosen) - 1,
         sides=frozenset[str]().union(*(log.sides for log in logs)),
     )

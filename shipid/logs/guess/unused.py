@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import State, unit_of_another
 from shipid.logs.guess.words import is_order, meaning_scores, name_parts
@@ -53,9 +51,6 @@ def _unused_reason(state: State, name: str) -> str:
     better = " and ".join(repr(one.source) for one in state.suggestions if one.name.rsplit(".", 1)[-1] in group)
     if better:
         return f"{'an order, and the measured ' * is_order(name)}{word} is read from {better}"
-    if np.ptp(state.columns[name]) == 0:
-        return f"it may be {word}, but it is the same in every row"
-    partner = {"speed": "course", "course": "speed"}.get(meaning)
-    if partner and not any(partner in meaning_scores(other) for other in state.free() if other != name):
-        return f"it may be {word}, which says something together with a {partner} alone: there is none"
-    return f"it may be {word}, but the motion in the log does not bear that out"
+    if meaning in ("speed", "course"):
+        return f"it may be {word}: speed and course are read where both are there and fit the track"
+    return f"it may be {word}, but it is the same in every row, or the motion in the log does not bear that out"

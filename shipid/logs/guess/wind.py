@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import Array
-from shipid.logs.guess.clues import State, unit_in_name
+from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import likely_unit
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.guess.settings import SETTINGS
-from shipid.logs.guess.words import name_parts, wind_kind
+from shipid.logs.guess.words import name_parts, unit_in_name, wind_kind
 from shipid.logs.mapping import to_si
 
 FEW_ROWS, FAR, BRIEF = 30, np.radians(240.0), 600.0  # rows; turn of the ship; s: parts of a log that show the wind

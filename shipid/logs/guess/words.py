@@ -10,7 +10,8 @@ import re
 import unicodedata
 from functools import cache
 
-from shipid.logs.amounts import UNIT_WORDS, is_known
+from shipid.logs.amounts import UNIT_WORDS, is_known, without_prefix
+from shipid.logs.mapping import UNITS
 from shipid.physics.signals import SIGNALS
 
 CONCEPTS = {
@@ -296,6 +297,8 @@ NO_VALUE = re.compile(
 """What logs write in a cell without a value, in lower case."""
 LONGEST_WORD = 80  # letters: a longer one is not cut
 _TYPE = re.compile(r"^(?:lr|[a-z])(?=[A-Z]\w)")
+QUANTITIES = {"m/s": "speed", "rad/s": "rate"}
+"""SI unit -> the word that a unit in a name stands for: `langs_kn` is a speed ahead, `giring [deg/min]` a yaw rate."""
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
 
 
@@ -365,6 +368,36 @@ def units_in_name(name: str) -> list[str]:
     name = _plain_name(name)
     after = _AFTER.search(name)
     return [*re.findall(r"[\[(]([^\])]*)[\])]", name), *([after.group(1).strip()] if after else [])]
+
+
+def unit_in_name(name: str, si: str) -> str | None:
+    """The unit in a name, in brackets or at its end; None if there is none that converts to the SI unit `si`."""
+    return _unit_and_factor(name, si)[0]
+
+
+def factor_in_name(name: str) -> float:
+    """What the prefix of a unit in a name multiplies it by, 1000 of `Engine [krpm]`; 1 where there is none."""
+    return next((factor for si in ("rad", "rad/s", "rev/s") if (factor := _unit_and_factor(name, si)[1]) != 1.0), 1.0)
+
+
+def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
+    inside = units_in_name(name)
+    bare = re.sub(r"[\[(].*", "", name).strip()
+    parts = [part for part in re.split(r"[_ ]|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", bare) if part]
+    alone = len(parts) < 2 and si != "rev/s"
+    ends = [] if alone else ["_".join(parts[-2:]), *parts[-1:]]
+    if si == "rev/s" and not inside and re.search("rpm|rps", bare.lower()):
+        ends.append("rpm" if "rpm" in bare.lower() else "rps")
+        ends = ["krpm"] if re.search("(?<![a-z])krpm", bare.lower()) else ends
+    if si in ("N", "N m") and (force := re.search(r"[kK]?N[mM]?$", bare)):  # `thrust_kN` is cut before the N
+        ends = [force[0]]
+    for candidate, factor in map(without_prefix, [*reversed(inside), *ends]):
+        for unit, expected in UNIT_WORDS.items():
+            if (unit in UNITS[si] or (unit == "%" and si == "rev/s")) and re.fullmatch(
+                expected, candidate.strip().lower()
+            ):
+                return unit, factor
+    return None, 1.0
 
 
 def shaft_unit(name: str) -> str:
@@ -507,6 +540,7 @@ def meaning_scores(name: str) -> dict[str, float]:
 
 def _scores_of_name(name: str) -> dict[str, float]:
     parts = list(name_parts(name))
+    said = {what for si, what in QUANTITIES.items() if unit_in_name(name, si) is not None} - {*parts}
     order = is_order(name)
     sides = {word for words in SIDE_WORDS.values() for word in words.split("|")}
     aside = sides | SOURCES | (ORDERS if order else set())
@@ -516,7 +550,9 @@ def _scores_of_name(name: str) -> dict[str, float]:
     meanings: dict[str, float] = {}
     for meaning, phrases in _meaning_phrases().items():
         beside = {*BESIDE.get(meaning, "").split()} & {*parts}
-        best = max((_phrase_share(phrase, beside, parts, content, aside) for phrase in phrases), default=0.0)
+        best = max(
+            _phrase_share(phrase, beside, [*parts, *said], content, aside) for phrase in phrases if phrase - said
+        )
         row = SIGNALS.get(meaning)
         if order and row is not None and row.role != "command":
             best = 0.0

@@ -56,7 +56,9 @@ def test_a_heading_that_changes_its_unit_is_asked(radians_first: bool, rate: boo
             radians[:] = radians_first
         result = guess_of(tmp_path, log.assign(psi=log["psi"].where(~radians, np.radians(log["psi"])).round(4)))
         asked = [one.sentence for one in result.questions]
-        assert sum("is 'psi' in radians from t = " in sentence for sentence in asked) == (share > 0.0), asked
+        assert sum(sentence.startswith("from t = ") and "keeps to 'psi' in " in sentence for sentence in asked) == (
+            share > 0.0
+        )
         assert not [sentence for sentence in asked if "another unit or sign" in sentence]
 
 
@@ -94,6 +96,8 @@ def test_an_angle_that_turns_the_ship_otherwise_is_asked_under_way_alone(seed: i
     state.psi, state.r = cumulative_integral(t, r), r
     speed = np.where(first, 5.0, 0.3 if slow else 5.0)
     state.position = np.cumsum(speed * np.exp(1j * state.psi)) + random.normal(0, 0.3, len(t))
+    state.columns["heading"] = state.psi
+    state.suggest("psi", "heading", "rad", 0.9, "by its name")
     state.suggest("thruster.alpha", "azimuth", "rad", 0.9, "by its name")
     ask_for_changes(state, PAUSE)
     asked = [one.sentence for one in state.questions if "turns the ship to the other side" in one.sentence]
@@ -101,8 +105,8 @@ def test_an_angle_that_turns_the_ship_otherwise_is_asked_under_way_alone(seed: i
 
 
 ODD = {
-    "heading": (2, lambda part: part.assign(psi=(part["psi"] + 90.0) % 360.0), "keep to 'psi'"),
-    "axes": (2, lambda part: part.assign(N=part["E"], E=part["N"]), "keep to 'psi'"),
+    "heading": (2, lambda part: part.assign(psi=(part["psi"] + 90.0) % 360.0), "keeps to 'psi' in deg to "),
+    "axes": (2, lambda part: part.assign(N=part["E"], E=part["N"]), "keeps to 'psi' in deg to "),
     "rudder": (0, lambda part: part.assign(rudder=-part["rudder"]), "'rudder' turns the ship to the other side"),
     "none": (0, lambda part: part, ""),
 }
@@ -116,7 +120,7 @@ def test_a_file_of_another_kind_is_named(kind: str, tmp_path: Path) -> None:
         part = CLEAN.iloc[rows]
         (change(part) if number == odd else part).to_csv(tmp_path / f"run{number}.csv", index=False)
     asked = [one.sentence for one in guess(tmp_path).questions if "in file " in one.sentence]
-    assert len(asked) == (kind != "none")
+    assert len(asked) == (kind != "none"), asked
     assert all(f"in file {odd + 1} of 5" in sentence and words in sentence for sentence in asked)
 
 

@@ -153,38 +153,6 @@ def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path)
     assert sniff(tmp_path, counted.rename(columns={"time_s": "x"}).assign(N=1.0, psi=2.0)).clock["from"] == "x"
 
 
-@pytest.mark.parametrize(
-    ("first", "style", "jump", "words"),
-    [
-        (
-            "2024-05-08 08:00",
-            "%d/%m/%Y %H:%M:%S",
-            0,
-            "'08/05/2024 08:00:00' is read as 2024-05-08: or is it 2024-08-05",
-        ),
-        (
-            "2024-05-08 08:00",
-            "%m/%d/%Y %H:%M:%S",
-            0,
-            "'05/08/2024 08:00:00' is read as 2024-08-05: or is it 2024-05-08",
-        ),
-        ("2024-05-08 08:00", "%d.%m.%Y %H:%M:%S", 0, ""),
-        ("2024-05-14 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
-        ("2024-05-05 08:00", "%d/%m/%Y %H:%M:%S", 0, ""),
-        ("2024-05-08 12:59:30", "%H:%M:%S", 0, ""),
-        ("2024-05-08 23:59:30", "%H:%M:%S", 0, ""),
-        ("2024-03-31 01:50:10", "%Y-%m-%d %H:%M:%S", 3605, ""),
-    ],
-)
-def test_dates_that_may_be_other_moments_are_asked(
-    first: str, style: str, jump: int, words: str, tmp_path: Path
-) -> None:
-    moments = pd.Timestamp(first) + pd.to_timedelta([k + jump * (k >= 30) for k in range(60)], "s")
-    rows = [f"{one.strftime(style)},{k % 7}" for k, one in enumerate(moments)]
-    doubts = recognise_log(log_of(tmp_path, ["time,x", *rows])).doubts
-    assert [words in doubt for doubt in doubts] == [True] * bool(words)
-
-
 def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path) -> None:
     rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
     twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.logs.guess.clues import (
-    factor_in_name,
-    names_another,
-    unit_in_name,
-    unit_of_another,
-    unknown_unit,
-)
+from shipid.logs.guess.clues import names_another, unit_of_another, unknown_unit
+from shipid.logs.guess.words import factor_in_name, unit_in_name
 
 
 @pytest.mark.parametrize(

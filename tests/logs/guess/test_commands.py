@@ -62,17 +62,6 @@ def test_an_azimuth_angle_of_half_a_turn_ahead_is_asked(middle: float, sign: int
     assert all(f"write offset = {-sign * 180} (deg)" in sentence for sentence in asked)
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_rudder_turns_a_ship_that_goes_astern_the_other_way(sign: int) -> None:
-    """Its sign is that which it has ahead, and it is asked."""
-    state = state_with_pose({"rudder": -sign * RUDDER})
-    state.r, state.astern = R, True
-    choose_commands(state)
-    assert described(state)["rudder.delta"] == ("rudder", "deg", sign)
-    (question,) = state.questions
-    assert f"is 'rudder' positive to {'starboard' if sign > 0 else 'port'}?" in question.sentence
-
-
 def test_the_side_of_a_rudder_that_is_never_negative_is_asked_and_not_found() -> None:
     state = chosen({"rudder [deg]": 40.0 - RUDDER})
     assert described(state) == {"rudder.delta": ("rudder [deg]", "deg", 1)}
@@ -264,7 +253,7 @@ def test_a_shaft_that_hides_its_turns_astern_is_asked(
 ) -> None:
     """It was drafted as if it drove the ship ahead, in a log that goes astern for a share of it, without a word."""
     state = state_with_pose({name: shaft})
-    state.r, state.astern = R, bool(np.all(way < 0))
+    state.r = R
     state.position = np.cumsum(2.0 * way * np.exp(1j * LOG["psi"].to_numpy()))
     choose_commands(state)
     assert any("says its sense" in one.sentence for one in state.questions) == asked

@@ -10,8 +10,8 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.logs.formats import TextFormat
-from shipid.logs.guess.clock import name_without_unit
 from shipid.logs.guess.sniff import recognise_log
+from shipid.logs.guess.words import name_parts
 from shipid.logs.readers import read_log_table
 from tests.logs.guess.conftest import TABLE, T, log_of, sniff, text
 
@@ -57,7 +57,7 @@ def test_a_text_log_is_recognised(content: str, form: dict[str, object], tmp_pat
     sniffed = recognise_log(file)
     assert sniffed.form.items() >= form.items()
     np.testing.assert_allclose(sniffed.t, T)
-    assert [name_without_unit(name) for name in sniffed.columns] == ["n", "psi"]
+    assert [name_parts(name) for name in sniffed.columns] == [("n",), ("psi",)]
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
 
 

@@ -182,25 +182,10 @@ def _on_earth() -> dict[str, np.ndarray]:
     return {"lat": latitude, "lon": longitude}
 
 
-@pytest.mark.parametrize(
-    ("more", "why"),
-    [
-        ({"u": -SURGE, "v": -SWAY}, "the ship goes astern"),
-        ({"rpm": -60.0 - SURGE}, "the ship goes astern"),
-        ({"rpm": -60.0 - SURGE, "cog": COURSE, "sog": np.hypot(SURGE, SWAY)}, "the ship goes astern"),
-    ],
-)
-@pytest.mark.parametrize("place", [{"N": NORTH, "E": EAST}, _on_earth()], ids=["plane", "Earth"])
-def test_a_ship_that_goes_astern_all_the_time_keeps_her_heading(
-    place: dict[str, np.ndarray], more: dict[str, np.ndarray], why: str
-) -> None:
-    """Before, her heading was turned by 180 deg, or her positions to the other side of the Earth."""
-    state = chosen({**place, "heading": ASTERN, **more})
-    assert state.psi is not None
-    np.testing.assert_allclose(np.exp(1j * state.psi), -np.exp(1j * PSI), atol=1e-6)
-    assert not state.negated
-    assert [one.sentence for one in state.findings if one.kind == "astern" and why in one.sentence]
-    assert not [one for one in state.questions if "psi" in one.about]
+def test_a_ship_that_goes_astern_all_the_time_is_asked() -> None:
+    for place in ({"N": NORTH, "E": EAST}, _on_earth()):
+        state = chosen({**place, "heading": ASTERN, "rpm": -60.0 - SURGE})
+        assert [one for one in state.questions if "psi" in one.about]
 
 
 @pytest.mark.parametrize(

@@ -37,5 +37,5 @@ def test_a_speed_without_a_course_is_not_said_to_differ_from_the_motion(name: st
     log = as_bridge(si_log())
     speed = 3.6 * np.hypot(log["u"], log["v"])
     assert guess_of(tmp_path, log.drop(columns=["u", "v"]).assign(**{name: speed})).unused == {
-        name: "it may be speed, which says something together with a course alone: there is none"
+        name: "it may be speed: speed and course are read where both are there and fit the track"
     }
