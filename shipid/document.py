@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
 
-from shipid.errors import DocumentError, suggest_name
+from shipid.errors import RETIRED, DocumentError, suggest_name
 from shipid.files import open_file
 
 Document = dict[str, Any]
@@ -296,7 +296,7 @@ def _path_expression(pattern: str) -> re.Pattern[str]:
 def parse_model(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
     """Validate data by a pydantic model; DocumentError with path, value and remedy for the first problem.
 
-    An unknown key goes before a missing one: it is usually that key, mistyped.
+    An unknown key goes before a missing one: it is usually that key, mistyped. A retired key goes first.
     """
     from pydantic import ValidationError
 
@@ -306,7 +306,9 @@ def parse_model(model: Any, data: Any, file: Path | str | None, prefix: str = ""
         return parsed
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])
+        unknown = [entry for entry in problems if entry["type"] == "extra_forbidden"]
+        retired = [entry for entry in unknown if entry["loc"][-1] in RETIRED]
+        first = [*retired, *unknown, *problems][0]
         places = [".".join(filter(None, (prefix, *_location_in_data(data, entry)))) for entry in problems]
         path = places[problems.index(first)]
         if first["type"] == "extra_forbidden":

@@ -9,6 +9,27 @@ from functools import partial
 from os import PathLike
 
 LONGEST = 500  # characters of one part of a message
+NEAR_NAME = (
+    0.85  # similarity (difflib) from which on a name is mistyped, though it is a retired one: `units` for `unit`
+)
+_DRAFTED = "no option now: write the number into the drafted vessel"
+_RANDOM = "a key of the multisine, which is retired: delete it, levels are random"
+RETIRED = {
+    **dict.fromkeys(("path-drawn", "path-refined"), "it is retired, take kernel"),
+    **dict.fromkeys(("units", "budget", "choose", "averaged"), "a key of former methods: delete it"),
+    **dict.fromkeys(("signal", "period", "harmonics"), _RANDOM),
+    "station_keeping": "it is retired, and nothing takes its place",
+    "dof": "this is a vessel: `shipid study new --vessel FILE` writes a study of it",
+    "join": "it is retired: give both mappings one [origin], and join the tables with pandas",
+    "rotate": 'it is retired: write [repeat] "split.test" into the study',
+    "variants": "it is retired: factors and A are in the report of a run",
+    "schema": "it is retired: errors name the valid keys",
+    "--manoeuvres": "it is retired: `shipid study new --vessel FILE` writes a study of it, which `simulate` takes",
+    "--step": "it is retired: it is 1/500 of the time for a ship length",
+    "--leave": "it is retired: take `study prepare` and `study run --shard i/n`",
+    **dict.fromkeys(("--rudder-span", "--rudder-rate", "--density", "--frontal-area", "--lateral-area"), _DRAFTED),
+}
+"""Kinds, keys, commands and options that went, or that belong to another document -> what to do instead."""
 
 
 class ShipidError(Exception):
@@ -95,10 +116,13 @@ def shorten_line(text: str) -> str:
 
 
 def suggest_name(value: object, valid: Iterable[str], limit: int = 12) -> str:
-    """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names."""
+    """Hint for an invalid name: what to do for a retired one, `did you mean 'x'?`, or the first `limit` valid names."""
     names = sorted(valid)
     same = [name for name in names if name.casefold() == str(value).casefold()]
-    close = same or get_close_matches(str(value), names, n=1)
+    close = same or get_close_matches(str(value), names, n=1, cutoff=NEAR_NAME)
+    if not close and str(value) in RETIRED:
+        return RETIRED[str(value)]
+    close = close or get_close_matches(str(value), names, n=1)
     if close:
         return f"did you mean {close[0]!r}?"
     shown = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")

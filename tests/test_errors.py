@@ -41,6 +41,13 @@ def test_choices_suggest_what_is_close() -> None:
     assert suggest_name("X_h", ["X_hh", "x_H"]) == "did you mean 'x_H'?"
 
 
+def test_a_retired_name_says_what_to_do_unless_a_valid_name_is_nearly_the_same() -> None:
+    assert suggest_name("path-drawn", ["path-trained", "kernel"]) == "it is retired, take kernel"
+    assert suggest_name("units", ["kind", "memory"]) == "a key of former methods: delete it"
+    assert suggest_name("units", ["unit", "from"]) == "did you mean 'unit'?"
+    assert "units" not in suggest_name("unit", ["kind", "memory"])
+
+
 def test_choices_list_what_is_valid() -> None:
     assert suggest_name("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
     assert suggest_name("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")

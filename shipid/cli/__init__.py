@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import sys
 from collections.abc import Callable, Collection
 from copy import copy
@@ -17,7 +18,7 @@ import shipid
 from shipid.cli import data, expect, family, identify, predict, simulation, study, vessel
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
-from shipid.errors import ShipidError, is_utf_8
+from shipid.errors import RETIRED, ShipidError, is_utf_8
 from shipid.plugins import import_files
 
 OPTIONS: dict[str, Any] = {
@@ -96,7 +97,9 @@ def print_usage_error(error: Any, _: Any = None) -> None:
         " ".join(error.format_message().replace("Value error, ", "").split()),
         error.ctx.command_path if error.ctx else "shipid",
     )
-    sys.stderr.write(f"error: {fault.rstrip('.')}: `{command} --help` shows what is right\n")
+    typed = re.match(r"No such (?:command '|option: )([\w-]+)", fault)
+    remedy = RETIRED.get(typed[1] if typed else "", f"`{command} --help` shows what is right")
+    sys.stderr.write(f"error: {fault.rstrip('.')}: {remedy}\n")
 
 
 usage_error: Any = typer.BadParameter.__base__  # Typer, which has its own Click, does not export it

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from shipid.document import parse_model
-from shipid.errors import DataError, DocumentError, suggest_name
+from shipid.errors import RETIRED, DataError, DocumentError, suggest_name
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.calibrator import Calibrator
 from shipid.hybrid.forest import Forest
@@ -36,9 +36,6 @@ METHODS |= {
     "regression": Regression,
 }
 
-RETIRED = ("path-drawn", "path-refined")
-"""Kinds of version 0.2.0 in whose place there is `kernel`."""
-
 
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
@@ -51,7 +48,7 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
 def method_names(kind: str) -> str:
     """Return the names of the methods that there are, as the remedy where `kind` is none of them."""
     if kind in RETIRED:
-        return "it is retired, take kernel"
+        return RETIRED[kind]
     remedy = "one that you wrote needs its package, or `--with` the file that puts it into METHODS"
     return f"{suggest_name(kind, METHODS.names)} ({remedy})"
 

@@ -136,6 +136,12 @@ def test_a_mistake_is_one_line(mistake: str, capfd: pytest.CaptureFixture[str]) 
         (["study", "run"], "Missing argument 'study': `shipid study run --help`"),
         (["study", "run", "quick", "--nonsense"], "No such option: --nonsense: `shipid study run --help`"),
         (["nosuch"], "No such command 'nosuch': `shipid --help`"),
+        (["study", "rotate", "q"], "No such command 'rotate': it is retired: write [repeat]"),
+        (["data", "join", "a", "b"], "No such command 'join': it is retired: give both mappings one [origin]"),
+        (
+            ["simulate", "mariner", "--manoeuvres", "m"],
+            "No such option: --manoeuvres: it is retired: `shipid study new",
+        ),
         (["study", "run", "quick", "--workers", "many"], "Invalid value for '--workers': "),
     ],
 )

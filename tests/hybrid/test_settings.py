@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.hybrid.methods import RETIRED, method_of
+from shipid.hybrid.methods import method_of
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.search import spread_points
 
@@ -33,7 +33,7 @@ def test_a_method_that_cannot_be_meant_is_refused_in_one_line(name, changes, mes
 def test_an_unknown_kind_is_refused_with_the_names_and_a_retired_one_with_what_to_take():
     with pytest.raises(DocumentError, match="did you mean 'path-trained'"):
         method_of("path-traind", {})
-    for kind in RETIRED:
+    for kind in ("path-drawn", "path-refined"):
         with pytest.raises(
             DocumentError, match=rf"method\.kind: '{kind}' is no kind of method: it is retired, take kernel$"
         ):

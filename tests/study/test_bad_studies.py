@@ -70,7 +70,7 @@ BROKEN = {
     "method-with-a-plus": ("method.kernel+.name", "'kernel+'"),
     "family-without-method": ("method", "no method meets 'wrong-1': name its family in `families`"),
     "two-methods-of-one-name": ("method.1.name", "two methods are called 'kernel'"),
-    "kernel-with-a-budget": ("method.kernel.budget", "unknown key: valid: centres, linear"),
+    "kernel-with-a-budget": ("method.kernel.budget", "unknown key: a key of former methods: delete it"),
     "alone-with-a-setting": ("method.alone.trials", "unknown key"),
     "no-method": ("method", "must be a list of 1 or more entries (it has 0)"),
     "claims-of-unknown-method": ("claims.method", "did you mean 'kernel'?"),
