@@ -503,7 +503,8 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
 def _left_by_constant(state: State, seen: Complex, way: NDArray[np.generic]) -> float:
     """Share of a motion (W,) that a constant velocity or rate along a way (N,) leaves, as any still column is one."""
     ran = state.chosen.change(evidence.integrate_rate(state.t, way))
-    return 1.0 - abs(np.vdot(ran, seen)) ** 2 / max(float(np.vdot(ran, ran).real * np.vdot(seen, seen).real), 1e-300)
+    power = float(np.vdot(ran, ran).real * np.vdot(seen, seen).real)
+    return 1.0 - float(abs(np.vdot(ran, seen))) ** 2 / max(power, 1e-300)
 
 
 def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
