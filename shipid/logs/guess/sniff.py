@@ -66,7 +66,19 @@ BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one
 QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
 """How the names of x, y, z, w of a quaternion differ; numbers begin with the scalar, as in PX4 and ArduPilot."""
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
-SHIPS = ("mmsi", "userid", "imo", "imonumber", "callsign", "vesselname", "shipname", "vesselid", "shipid")
+SHIPS = (
+    "mmsi",
+    "userid",
+    "imo",
+    "imonumber",
+    "callsign",
+    "vesselname",
+    "shipname",
+    "vesselid",
+    "shipid",
+    "vessel",
+    "ship",
+)
 UNKNOWN = ("0", "unknown")
 """Names of columns that say the ship, in small letters alone; what they hold for an unknown one."""
 
