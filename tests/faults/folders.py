@@ -479,7 +479,7 @@ def ships(seed: int) -> None:
             at = rng.randrange(150)
             words.append(f"killed at call {at}")
             child(lambda at=at: run(at))  # type: ignore[misc]
-        if rng.random() < 0.6 and (place / "run").is_dir():
+        if rng.random() < 0.6 and any((place / "run").glob("**/*.*")):
             words.append(_damage(place / "run", rng))
         code = child(lambda: run(10**6))
         if code:
