@@ -110,7 +110,7 @@ def import_log(
     source, off = as_path("file", file, DataError), tuple(without)
     for kind in off:
         check_choice("repair", kind, REPAIRS, DataError)
-    digest = log_digest(mapping, source)
+    digest, state = log_digest(mapping, source), _state_of_files(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(
             "not the file this mapping was written for (sha256 differs): fetch that file, or copy the mapping, "
@@ -126,7 +126,7 @@ def import_log(
             mapping = mapping.model_copy(
                 update={"origin": PlaneOrigin.model_construct(latitude=first[0], longitude=first[1])}
             )
-    if digest != log_digest(mapping, source):
+    if (digest, state) != (log_digest(mapping, source), _state_of_files(mapping, source)):  # or a link led elsewhere
         raise DataError("has changed while it was read: import it again when nothing writes to it", file=source)
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows, repairs = parts[0].rows, _add_records([part.records for part in parts])
@@ -209,6 +209,13 @@ def log_digest(mapping: Mapping, log: Path) -> str:
 
 def _files_of_log(mapping: Mapping, log: Path) -> list[Path]:
     return [*run_files(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
+
+
+def _state_of_files(mapping: Mapping, log: Path) -> list[tuple[int, int]]:
+    """Number and time of change [ns] of files and of links on the way to them: a change that was taken back differs."""
+    files = _files_of_log(mapping, log)
+    links = [place.lstat() for file in files for place in (file, *file.absolute().parents) if place.is_symlink()]
+    return [(state.st_ino, state.st_ctime_ns) for state in (*links, *(file.stat() for file in files))]
 
 
 def file_digest(file: Path) -> str:
