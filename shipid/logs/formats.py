@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from shipid.logs.repairs import StrictPart
 from shipid.logs.workbook import SEPARATOR
@@ -33,6 +33,13 @@ class TableFormat(Format):
     def text(self) -> TextFormat:
         """How the lines of the table are read."""
         return TextFormat(separator=SEPARATOR, **{name: getattr(self, name) for name in TableFormat.model_fields})
+
+    @field_validator("thousands")
+    @classmethod
+    def _other(cls, thousands: str | None, values: ValidationInfo) -> str | None:
+        if thousands is not None and thousands == values.data.get("decimal"):
+            raise ValueError("must be another sign than decimal")
+        return thousands
 
 
 class TextFormat(TableFormat):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -51,3 +52,10 @@ def test_a_quaternion_that_is_none_is_named() -> None:
     np.testing.assert_allclose(decode_numbers(parts, tuple("xyzw"), "quaternion", log, FILE, "p"), np.pi / 2)
     with pytest.raises(DataError, match="2 in row 1 is the size of what has to be a quaternion"):
         decode_numbers([2 * part for part in parts], tuple("xyzw"), "quaternion", log, FILE, "p")
+
+
+@pytest.mark.parametrize("sign", [",", "."])
+def test_one_sign_for_decimals_and_thousands_is_refused(sign: Literal[",", "."]) -> None:
+    """1,500 may be 1.5 or 1500."""
+    with pytest.raises(ValueError, match="must be another sign than decimal"):
+        TextFormat(decimal=sign, thousands=sign)
