@@ -9,15 +9,11 @@ from functools import partial
 from os import PathLike
 
 LONGEST = 500  # characters of one part of a message
-NEAR_NAME = (
-    0.85  # similarity (difflib) from which on a name is mistyped, though it is a retired one: `units` for `unit`
-)
+NEAR_NAME = 0.85  # similarity (difflib) from which on a retired name is a valid one, mistyped: `units` for `unit`
 _DRAFTED = "no option now: write the number into the drafted vessel"
-_RANDOM = "a key of the multisine, which is retired: delete it, levels are random"
 RETIRED = {
     **dict.fromkeys(("path-drawn", "path-refined"), "it is retired, take kernel"),
     **dict.fromkeys(("units", "budget", "choose", "averaged"), "a key of former methods: delete it"),
-    **dict.fromkeys(("signal", "period", "harmonics"), _RANDOM),
     "station_keeping": "it is retired, and nothing takes its place",
     "dof": "this is a vessel: `shipid study new --vessel FILE` writes a study of it",
     "join": "it is retired: give both mappings one [origin], and join the tables with pandas",

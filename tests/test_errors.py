@@ -46,6 +46,7 @@ def test_a_retired_name_says_what_to_do_unless_a_valid_name_is_nearly_the_same()
     assert suggest_name("units", ["kind", "memory"]) == "a key of former methods: delete it"
     assert suggest_name("units", ["unit", "from"]) == "did you mean 'unit'?"
     assert "units" not in suggest_name("unit", ["kind", "memory"])
+    assert suggest_name("period", ["T_p", "H_s"]) == "valid: H_s, T_p"  # a word of other documents, too
 
 
 def test_choices_list_what_is_valid() -> None:
