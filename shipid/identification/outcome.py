@@ -598,7 +598,7 @@ def _fit_warnings(
             longer = [f"{significant_digits(LONG * longest)} s"] if LONG * longest < _longest_run(solution) else []
             warnings.append(
                 f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals"
-                f"; compare with {', or '.join([*longer, 'of a course-stable ship whole runs (horizon 0)'])}"
+                f"; compare with {', or '.join([*longer, 'whole runs (horizon 0) if the ship keeps its course'])}"
             )
     best = judged.covariances[judged.chosen]
     if not best.trusted:
