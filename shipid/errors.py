@@ -14,6 +14,9 @@ _DRAFTED = "no option now: write the number into the drafted vessel"
 RETIRED = {
     **dict.fromkeys(("path-drawn", "path-refined"), "it is retired, take kernel"),
     **dict.fromkeys(("units", "budget", "choose", "averaged"), "a key of former methods: delete it"),
+    "resample": "it is retired: write `step` and `max_gap` into [clock]",
+    "kaimal": "it is retired, take npd",
+    "harmonics": "it is retired, with signal and period: levels are random",
     "station_keeping": "it is retired, and nothing takes its place",
     "dof": "this is a vessel: `shipid study new --vessel FILE` writes a study of it",
     "join": "it is retired: give both mappings one [origin], and join the tables with pandas",
@@ -21,7 +24,7 @@ RETIRED = {
     "variants": "it is retired: factors and A are in the report of a run",
     "schema": "it is retired: errors name the valid keys",
     "--manoeuvres": "it is retired: `shipid study new --vessel FILE` writes a study of it, which `simulate` takes",
-    "--step": "it is retired: it is 1/500 of the time for a ship length",
+    "--step": "it is retired: a manoeuvre takes 1/500 of the time for a ship length",
     "--leave": "it is retired: take `study prepare` and `study run --shard i/n`",
     **dict.fromkeys(("--rudder-span", "--rudder-rate", "--density", "--frontal-area", "--lateral-area"), _DRAFTED),
 }

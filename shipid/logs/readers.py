@@ -129,7 +129,9 @@ def _read_text(file: Path, form: TextFormat, columns: Sequence[str], *_: object)
         kind = next((name for name, one in READERS.items() if one.detect and one.detect(file, content[:ENOUGH])), None)
         if kind is not None:
             raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
-        message = "holds NUL bytes: binary, or UTF-16 text; export it as text or set the encoding"
+        message = (
+            "holds NUL bytes: binary, UTF-16 text, or a power cut; export it as text, set the encoding or remove them"
+        )
         raise DataError(message, file=file, path="format.encoding")
     try:
         text = io.TextIOWrapper(io.BytesIO(content), encoding=form.encoding, newline="")

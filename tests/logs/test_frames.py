@@ -11,6 +11,7 @@ import pytest
 from pymap3d import geodetic2ned, ned2geodetic
 
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
+from shipid.errors import DataError
 from shipid.logs.frames import PARALLEL, meridian_convergence, unwrap_in_place
 from tests.drawn import seeds
 from tests.logs.conftest import import_written, turning
@@ -89,6 +90,18 @@ def origin(place: tuple[float, float]) -> str:
 
 def told(dataset: Dataset) -> list[str]:
     return [f"{one['column']}: {one['note']}" for one in dataset.metadata["repairs"] if one["kind"] == "turned"]
+
+
+@pytest.mark.parametrize("seed", seeds(4, 5))
+@pytest.mark.parametrize("name", ["psi", "twd"])
+def test_an_angle_in_tenths_of_a_degree_is_refused(seed: int, name: str, tmp_path: Path) -> None:
+    """A wind direction was read ten times too large, without a word."""
+    random = np.random.default_rng(seed)
+    log = recorded((60.0, 5.0)).assign(twd=random.uniform(60.0, 300.0) + random.normal(0.0, 5.0, len(T)))
+    imported(log, tmp_path)
+    log.loc[::9, name] = np.nan
+    with pytest.raises(DataError, match=f"'{name}' reaches .* deg, and with wrap = true it .*: is the unit right"):
+        imported(log.assign(**{name: 10.0 * log[name]}), tmp_path)
 
 
 @pytest.mark.parametrize("seed", seeds(3, 5))

@@ -35,6 +35,8 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 
 PART = 0.4  # of the windows of the guess: about a quarter of a usual turn
 LONGEST_UNIT = 6  # letters of a unit that is not known
+PART_OF_UNIT = re.compile(r"[\d.,/]+ ?[*×x]? ?([^\W\d]+|°)|([^\W\d]+|°) ?[*×x/] ?[\d.,]+")
+"""A part or a multiple of a unit, as in 0.1 deg and deg x 10, in lower case."""
 LIKELY = 0.6  # confidence from which a suggestion is not marked as unsure
 OF_POSE = ("latitude", "longitude", "north", "east", "x", "y", "psi")
 NEARLY, STRONG = 0.1, 0.65  # how much worse than its best meaning a name may fit another; a name that says something
@@ -84,7 +86,8 @@ def unknown_unit(name: str) -> str:
     for text in map(str.strip, units_in_name(name)):
         known = is_known(without_prefix(text)[0]) or north_reference(text) or is_note(text)
         short = len(text) <= LONGEST_UNIT and (text == "V" or len(re.findall(r"[^\W\d_]", text)) > 1)
-        if not known and (short or re.search(r"\w[/^]\w", text)):
+        part = PART_OF_UNIT.fullmatch(text.lower())
+        if (not known and (short or re.search(r"\w[/^]\w", text))) or (part and is_known(part[1] or part[2])):
             return text
     return ""
 

@@ -60,7 +60,7 @@ def defects_of_motion(state: State) -> None:
     if state.body is not None:
         found = _diagnose_motion(state)
         _ask_if_course(state, state.body)
-    while found is not None and found.cause != "none":
+    while found is not None:
         repair = document.parse_toml(found.repair).get("repair", [None])[0] if found.repair.startswith("[[") else None
         if repair is not None and repair.get("seconds", 0.0) < 0.0:  # the other one is late
             repair |= {"signal": OTHER[repair["signal"]], "seconds": -repair["seconds"]}

@@ -66,18 +66,9 @@ BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one
 QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
 """How the names of x, y, z, w of a quaternion differ; numbers begin with the scalar, as in PX4 and ArduPilot."""
 MINUTES = frozenset("min minute minutes m mm ' sec second seconds s ss".split()) | {'"'}
-SHIPS = (
-    "mmsi",
-    "userid",
-    "imo",
-    "imonumber",
-    "callsign",
-    "vesselname",
-    "shipname",
-    "vesselid",
-    "shipid",
-    "vessel",
-    "ship",
+SHIPS = re.compile(
+    "mmsi|userid|imo|imonumber|callsign"
+    "|(ship|vessel|boat|schiffs?|skip|skib|fartyg|navire|buque|nave|schip)s?(name|namn|navn|naam|nombre|nom|id|no|nr|number)*"
 )
 UNKNOWN = ("0", "unknown")
 """Names of columns that say the ship, in small letters alone; what they hold for an unknown one."""
@@ -236,9 +227,8 @@ def _text_sample(file: Path, encoding: str, size: int) -> str:
 
 
 def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
-    """Raise DataError where a log holds several ships, as a column names them: the surest of these decides."""
-    names = {re.sub(r"[^a-z]", "", name.lower()): name for name in reversed([*map(str, table.columns)])}
-    for name in (names[one] for one in SHIPS if one in names):
+    """Raise DataError where a log holds several ships, as any column names them."""
+    for name in (one for one in map(str, table.columns) if SHIPS.fullmatch(re.sub(r"[^a-z]", "", one.lower()))):
         texts = column_called(table, name).dropna().astype(str).str.strip().unique()
         known = [one for one in texts if not NO_VALUE.fullmatch(one.lower()) and one.lower() not in UNKNOWN]
         ships = [*{one.casefold(): one for one in reversed(known)}.values()][::-1]

@@ -53,6 +53,7 @@ def test_the_prefix_of_a_unit_is_a_factor(name: str, factor: float) -> None:
     ("name", "unit"),
     [
         *(("Rudder [mV]", "mV"), ("Rudder [V]", "V"), ("Shaft [counts]", "counts")),
+        *((f"Roll [{part}]", part) for part in ("0.1 deg", "1/10 deg", "0,01°", "deg x 10", "deg*10", "deg/10")),
         *(
             (f"Rudder {note}", "")
             for note in ("[deg]", "[mrad]", "[-]", "(stbd)", "(P)", "(order)", "(feedback)", "(2)")
