@@ -261,8 +261,8 @@ def test_errors_along_the_test_runs_are_the_studys(tmp_path: Path, tiny_run: Pat
     assert re.match(r"5 s ahead predictions err by \d\.\d+ m on average, nine in ten below", frame.attrs["errors"])
     knew, every = len(Predictor.load(cell_file(tiny_run, CELL)).provenance["runs"]), len(frame["run"].unique())
     assert frame.attrs["limits"] == [
-        f"{knew} of {every} runs named as runs that trained this predictor: "
-        "if they are these, their errors are no evidence"
+        f"{knew} of {every} runs named like runs that trained this predictor: "
+        "if they are the same, their errors are no evidence"
     ]
     log = read_dataset(tiny_run / DATASET).frame
     true = log[["run", "t", "north", "east"]].rename(columns={"t": "at"})

@@ -117,8 +117,10 @@ class AnswerCase:
     def rival(self, name: str, best: str, amount: int, metric: Literal["H", "H_end"] = "H") -> str:
         """The same error of a rival, and whether the test shows that it differs from that of the best model."""
         error, table = self.error(name, amount, metric), self.table if metric == "H" else self.at_horizon
-        if not {name, best} <= set(table.H) or too_few_manoeuvres(table.runs):
-            return f"{error}, untested"
+        if too_few_manoeuvres(table.runs):
+            return f"{error}, too few test runs"
+        if not {name, best} <= set(table.H):
+            return f"{error}, not compared"
         more, less, _ = self.sides([best], table.lead(name, [best], self.ends[amount]))
         return f"{error}, {'shown to be larger' if more else 'shown to be less' if less else 'not shown to differ'}"
 
@@ -246,17 +248,19 @@ def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
 def _count_of_better(models: Sequence[str], lead: Differences, sides: Sequence[list[str]]) -> str:
     """How many physics models do better than none, and which do worse or cannot be told."""
     better, worse, unknown = sides
-    count = f"{len(better) or 'none'} of {len(models)}"
-    if len(better) == len(models) > 1:
+    how = "worse" if len(worse) == len(models) else "better"
+    named, shown = (worse, lead.below) if how == "worse" else (better, lead.above)
+    count = f"{len(named) or 'none'} of {len(models)}"
+    if len(named) == len(models) > 1:
         count = "both" if len(models) == 2 else f"all {len(models)}"
-    verb = plural_word(len(better), "does", "do") if better else "is shown to do"
+    verb = plural_word(len(named), "does", "do") if named else "is shown to do"
     words = [
-        f"{count} physics models {verb} better than no physics"
-        + (f": {model_list(better)}" if 0 < len(better) < len(models) else "")
-        + stricter_list(models, lead.above)
+        f"{count} physics models {verb} {how} than no physics over the whole horizon"
+        + (f": {model_list(named)}" if 0 < len(named) < len(models) else "")
+        + stricter_list(models, shown)
     ]
     do, unsure = plural_word(len(worse), "does", "do"), model_list(unknown) if better or worse else "all of them"
-    words += [f"{model_list(worse)} {do} worse{stricter_list(models, lead.below)}"] if worse else []
+    words += [f"{model_list(worse)} {do} worse{stricter_list(models, lead.below)}"] if worse and how == "better" else []
     words += [f"for {unsure} the test cannot tell"] if unknown else []
     return "; ".join(words)
 

@@ -53,9 +53,10 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
     ordered = row is not None and row.angle and is_command(name)
     if column.wrap and ordered and not is_all_round(name) and not may_wrap(values[np.isfinite(values)], name):
         raise DataError(f"{column.source!r} {_not_of_turns(values)}", file=file, path=f"columns.{name}")
-    if column.wrap and np.mean(np.abs(values) > 1.5 * TURN) > 0.5:  # half a turn may be an offset
-        words = f"reaches {np.degrees(np.nanmax(np.abs(values))):.4g} deg, and with wrap = true it is within a turn"
-        raise DataError(f"{column.source!r} {words}: is the unit right?", file=file, path=f"columns.{name}")
+    begin = next(iter(values[np.isfinite(values)]), 0.0)
+    if column.wrap and abs(begin) > 1.5 * TURN:  # half a turn may be an offset; later ones may count on
+        words = f"begins with {np.degrees(begin):.4g} deg, more than a turn: is the unit right?"
+        raise DataError(f"{column.source!r} {words}", file=file, path=f"columns.{name}")
     if column.wrap or not (is_wrapped_angle(name) or name == "course" or ordered):
         return
     if not np.nanmax(values, initial=-np.inf) - np.nanmin(values, initial=np.inf) > TURN - ABOUT:

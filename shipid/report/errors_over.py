@@ -231,11 +231,11 @@ def error_by_kind(content: ReportContent) -> PageTable:
     learned = frame[frame.source.eq(source)]
     best = learned.loc[learned.groupby("kind", sort=False)["mean"].idxmin()] if len(learned) else learned
     parts = [
-        f"{row['kind']}: {number_text(row['end'])} m at the horizon, H {number_text(row['mean'])} m ({row['model']})"
+        f"{row['kind']} {number_text(row['end'])} m at the horizon, H {number_text(row['mean'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
     takeaway = (
-        f"Least mean on the test itself, which nobody can choose by, {of}: {'; '.join(parts)}."
+        f"Lowest errors {of}, which only the test shows, too late for a choice: {'; '.join(parts)}."
         if parts
         else "No model with data has a result."
     )

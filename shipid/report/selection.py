@@ -88,7 +88,7 @@ def family_words(content: ReportContent, families: Iterable[str]) -> str:
     """What each family of models is, as sentences; empty where that is not known."""
     known = content.models.dropna(subset="description").groupby("family")["description"].first()
     named = [name for name in dict.fromkeys(families) if name != DATA_DRIVEN and known.get(name)]
-    return "".join(f" {name}: {known[name]}." for name in named)
+    return "".join(f" {name}: {known[name]}{'.' * (known[name][-1] not in '.?!')}" for name in named)
 
 
 def words_on_left_out(content: ReportContent) -> str:

@@ -145,7 +145,7 @@ def limits_in_words(predictor: Predictor, dataset: Dataset, diverged: pd.Series[
     many = f"{len(trained)} of {len(dataset.runs)} {plural_word(len(dataset.runs), 'run')}"
     lost = f"physics diverges on {percent_text(diverged.mean(), 1)} of the instants"
     texts = (
-        f"{many} named as runs that trained this predictor: if they are these, their errors are no evidence"
+        f"{many} named like runs that trained this predictor: if they are the same, their errors are no evidence"
         if trained
         else "",
         f"{lost}: paths there go no farther than the present speed takes the ship" if diverged.any() else "",

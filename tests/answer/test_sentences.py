@@ -37,15 +37,18 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     advice = text(made(grid(H, (10, 30, 60))))
     assert advice.startswith(
         "8 s ahead, good (best in validation) with 60 runs errs by 0.50 m on average, nine in ten below 0.75 m. "
-        "Without physics: 1.25 m, untested.\n"
+        "Without physics: 1.25 m, too few test runs.\n"
     )
     assert "H is the mean error over all 8 s, not only at their end: 0.50 m for good with 60 runs." in advice
-    assert "Its physics alone has A = 2.00 m. Without physics H is 1.25 m, untested." in advice
+    assert "Its physics alone has A = 2.00 m. Without physics H is 1.25 m, too few test runs." in advice
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, H of good (best in validation) is 1.50 m. " in advice
     assert f"Without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
     assert "With 10 and 60 runs, every compared model beats constant u, v, r (H 10.0 m)." in advice
-    assert "With 60 runs, 1 of 2 physics models does better than no physics: good; bad does worse." in advice
+    assert (
+        "With 60 runs, 1 of 2 physics models does better than no physics over the whole horizon: good; "
+        "bad does worse." in advice
+    )
 
 
 @pytest.mark.parametrize(("error", "told"), [(0.5, True), (2.0, False)])
@@ -76,7 +79,7 @@ def test_the_headline_names_the_best_of_all_by_validation(
     known = {"regression": {key: 0.2 * results.naive[..., None] * [1.0, 0.0] for key in keys}}
     headline = text(replace(results, **known, regression_loss=dict.fromkeys(keys, regression))).partition("\n")[0]
     assert headline.startswith(f"8 s ahead, {first}")
-    assert ("With physics (good): 1.00 m, untested." in headline) == (not first.startswith("good"))
+    assert ("With physics (good): 1.00 m, too few test runs." in headline) == (not first.startswith("good"))
 
 
 @pytest.mark.parametrize("runs", [1, 8])
@@ -121,7 +124,7 @@ def test_physics_worth_no_run_at_all(made: Any) -> None:
 
 def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
-    assert "\nWith 10 or 30 runs, both physics models do better than no physics.\n" in advice
+    assert "\nWith 10 or 30 runs, both physics models do better than no physics over the whole horizon.\n" in advice
 
 
 def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
@@ -199,8 +202,8 @@ def test_how_good_physics_must_be(made: Any) -> None:
         advice,
     )
     assert (
-        "\nWith 30 runs, none of 5 physics models is shown to do better than no physics; for all of them the test"
-        in advice
+        "\nWith 30 runs, none of 5 physics models is shown to do better than no physics over the whole horizon; "
+        "for all of them the test" in advice
     )
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
@@ -208,7 +211,7 @@ def test_how_good_physics_must_be(made: Any) -> None:
         "With 10 or 30 runs, physics pays even if its own mean error over the horizon, A, is 16.0 m, the worst tried.\n"
         in advice
     )
-    assert "\nWith 10 or 30 runs, all 5 physics models do better than no physics.\n" in advice
+    assert "\nWith 10 or 30 runs, all 5 physics models do better than no physics over the whole horizon.\n" in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert (
@@ -247,12 +250,18 @@ def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
     )
 
 
+def test_that_all_physics_does_worse_is_one_clause(made: Any) -> None:
+    """It was `none of 2 physics models is shown to do better than no physics; a and b do worse`."""
+    advice = text(made(grid({"a": (9.0, 8.0), "b": (8.0, 7.0), "none": (3.0, 2.0)}), runs=8))
+    assert "With 10 or 30 runs, both physics models do worse than no physics over the whole horizon.\n" in advice
+
+
 def test_names_are_those_that_the_test_can_tell(made: Any) -> None:
     """`bad` is 1 % below no physics in all eight manoeuvres; another training may differ by 3 %."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (8.91, 2.0), "none": (9.0, 4.0)}), runs=8))
     assert (
-        "With 10 runs, 1 of 2 physics models does better than no physics: good; for bad the test cannot tell.\n"
-        in advice
+        "With 10 runs, 1 of 2 physics models does better than no physics over the whole horizon: good; "
+        "for bad the test cannot tell.\n" in advice
     )
 
 
@@ -318,7 +327,7 @@ def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     """`bad` has no result at 30 runs: nothing is claimed of every model, and the failure is named."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
     assert "1 of 6 cells has no result (bad: no training converged)" in advice
-    assert "With 10 or 30 runs, 1 of 1 physics models does better than no physics" in advice
+    assert "With 10 or 30 runs, 1 of 1 physics models does better than no physics over the whole horizon" in advice
 
 
 def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:

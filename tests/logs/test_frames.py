@@ -100,7 +100,7 @@ def test_an_angle_in_tenths_of_a_degree_is_refused(seed: int, name: str, tmp_pat
     log = recorded((60.0, 5.0)).assign(twd=random.uniform(60.0, 300.0) + random.normal(0.0, 5.0, len(T)))
     imported(log, tmp_path)
     log.loc[::9, name] = np.nan
-    with pytest.raises(DataError, match=f"'{name}' reaches .* deg, and with wrap = true it .*: is the unit right"):
+    with pytest.raises(DataError, match=f"'{name}' begins with .* deg, more than a turn: is the unit right"):
         imported(log.assign(**{name: 10.0 * log[name]}), tmp_path)
 
 

@@ -37,3 +37,5 @@ def test_a_family_without_a_description_is_not_described(simulation):
     models = simulation.models.assign(description="")
     models.loc[models["family"] == "high", "description"] = "+-60 %"
     assert family_words(replace(simulation, models=models), ["moderate", "high"]) == " high: +-60 %."
+    asked = replace(simulation, models=models.assign(description="how much does it cost?"))
+    assert family_words(asked, ["high"]) == " high: how much does it cost?"

@@ -177,7 +177,7 @@ def test_runs_that_trained_and_physics_that_diverges_are_said(banded, tmp_path):
         file = replace(fast, provenance={"runs": runs}).save(tmp_path / "cell.npz")
         played = play_aboard(file, saved(frame.assign(**{"rudder.delta": 0.5}), tmp_path))
         text = " ".join(played.limits)
-        assert ("1 of 1 run named as runs that trained" in text) == said
+        assert ("1 of 1 run named like runs that trained" in text) == said
         assert f"diverges on {percent_text(played.instants['diverged'].mean(), 1)}" in text
         legs = played.points.assign(way=np.hypot(played.points["north"], played.points["east"]))
         assert np.isfinite(legs["way"]).all()

@@ -129,7 +129,7 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
         )
         state.ask(("delta",), f"{words}, or which value is amidships (offset)?")
     if share or unsided:
-        confidence, why = 0.3, f"by its name; up to {top:.4g}{share or ', and never negative'}"
+        confidence, why = 0.3, f"{why if share else 'by its name'}; up to {top:.4g}{share or ', and never negative'}"
     if seen and not unsided and (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is one aft of the origin
         extra["sign"] = -1
     if signal == "alpha":
