@@ -342,23 +342,21 @@ class ResidualPrediction:
         selected = {name: self.signals == name for name in self.problem.layout.signals}
         return {name: max(float(small[at].mean()), 1 / at.sum()) for name, at in selected.items() if at.any()}
 
-    def marginal(
-        self, threshold: float = np.inf, shares: Mapping[str, float] | None = None
-    ) -> tuple[Array, Array, Array]:
+    def marginal(self, threshold: float = np.inf) -> tuple[Array, Array, Array]:
         """Marginal residuals (m,), their Jacobian (m, n), and the leverage (m,) of the nuisances.
 
         With A the derivatives to the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi). At the optimum of xi
         its sum of squares is that of r and xi, and its Jacobian gives the Fisher information of the factors.
 
         With the Huber loss r is psi / sqrt(p) here, psi = r up to the threshold and constant beyond it, p the share of
-        the signal that is within, and derivatives are times sqrt(p): then information is that of Huber's covariance,
+        the signal that is `within`, and derivatives are times sqrt(p): then information is that of Huber's covariance,
         (J^T J)^-1 E[psi^2] / p^2 (Huber, Robust Statistics (1981), sec. 7.6).
 
-        threshold : of the Huber loss, in standard deviations. shares : signal -> p; default: `within`.
+        threshold : of the Huber loss, in standard deviations.
         """
         e, root = self.r, np.ones(len(self.r))
         if np.isfinite(threshold):
-            shares = self.within(threshold) if shares is None else shares
+            shares = self.within(threshold)
             root = np.sqrt(np.array([shares[name] for name in self.signals.tolist()]))
             e = np.clip(self.r, -threshold, threshold) / root
         e, J, spent = np.array(e), root[:, None] * self.by_factor, np.zeros(len(self.r))

@@ -37,7 +37,8 @@ def fetch_log(name: str) -> Path:
         return file
     if source.url is None or source.sha256 is None or source.runs is not None:
         raise DataError(
-            f"not downloaded: give the log itself, or set {FOLDER_VARIABLE} to a folder that holds it ({source.url})",
+            f"not downloaded: give the log itself, or set {FOLDER_VARIABLE} to a folder that holds it"
+            f"{f' ({source.url})' * bool(source.url)}",
             file=name,
             path="source.url",
         )

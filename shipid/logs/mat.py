@@ -138,14 +138,17 @@ def _open_structs(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple
 def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str]]:
     """Dotted name of every variable that is no vector of numbers, and what it is."""
     for name, value in _open_structs(variables):
-        array = np.asarray(value.shape if _is_sparse(value) else value)
+        struct = value[0] if isinstance(value, list) and value else None  # of cells among which is a struct
+        array = np.asarray(None if isinstance(value, list) else value.shape if _is_sparse(value) else value)
         if array.dtype.names:  # a datetime, a table: scipy does not open them
             about = [text.decode() if isinstance(text, bytes) else str(text) for text in array.ravel()[0]][:3]
             yield about[0], f"an object of class {about[2]}{NO_VECTOR}"
         elif _is_sparse(value):
             yield name, f"a sparse matrix{NO_VECTOR}"
-        elif array.dtype == object and array.size and isinstance(array.flat[0], dict):
-            yield from ((one, f"in an array of structs{NO_VECTOR}") for one in (name, *_keys_of(name, array.flat[0])))
+        elif isinstance(struct, dict):
+            yield from (
+                (one, f"in an array of structs{NO_VECTOR}") for one in (name, *[f"{name}.{key}" for key in struct])
+            )
         elif array.dtype.kind in "OUc" or array.ndim > 2:
             what = {"O": "an array of cells", "U": "text", "c": "complex"}.get(array.dtype.kind)
             yield name, f"{what or f'an array of {array.ndim} axes'}{NO_VECTOR}"
@@ -155,10 +158,6 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str]]:
             yield name, f"a matrix with a row for each signal{NO_VECTOR}"
         elif array.ndim == 2:
             yield name, f"a matrix: its columns are {name}.1 to {name}.{array.shape[1]}"
-
-
-def _keys_of(name: str, struct: dict[str, Any]) -> Iterable[str]:
-    return (f"{name}.{key}" for key in struct)
 
 
 def is_mat(_: Path, head: bytes) -> dict[str, Any] | None:

@@ -28,6 +28,15 @@ def test_every_bundled_mapping_names_its_bytes() -> None:
         assert None not in (source.url, source.sha256, source.file, source.citation, source.licence)
 
 
+def test_a_log_without_an_address_is_to_be_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ended with `(None)`."""
+    monkeypatch.delenv("SHIPID_DATA", raising=False)
+    mapping = tmp_path / "mapping.toml"
+    mapping.write_text((Path(__file__).parents[1] / "bad" / "logs" / "plain.toml").read_text())
+    with pytest.raises(DataError, match=r"to a folder that holds it$"):
+        fetch_log(str(mapping))
+
+
 def test_absent_and_changed_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHIPID_DATA", str(tmp_path))
     with pytest.raises(DataError, match="unset SHIPID_DATA to download"):

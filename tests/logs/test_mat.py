@@ -33,8 +33,11 @@ def cells(values: np.ndarray) -> np.ndarray:
     return array
 
 
+AMONG = np.empty(2, dtype=object)
+AMONG[:] = [{"a": 1.0}, T[:3]]
 NO_VECTORS: dict[str, tuple[Any, str]] = {
     "cells": (cells(T), r"'rpm' is an array of cells, not a vector of numbers: save one of it, such as by cell2mat"),
+    "cells with a struct": (AMONG, "'rpm' is in an array of structs, not a vector of numbers"),
     "text": ("120 rpm", "'rpm' is text, not a vector of numbers"),
     "complex": (T + 1j, "'rpm' is complex, not a vector of numbers"),
     "of another length": (T[:7], "'rpm' is of 7 values, and 'time' has 120"),
