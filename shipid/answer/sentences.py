@@ -342,7 +342,7 @@ def _headline(case: AnswerCase) -> Iterator[str]:
         most = float(rows["H_end_90"][leader])
         if {REGRESSION, leader} <= set(table.H) and table.mean(REGRESSION, place) < table.mean(leader, place):
             of_others.append(f" A regression errs by less: {case.rival(REGRESSION, leader, largest, 'H_end')}.")
-    names = {NO_MODEL: "no physics" if plan.families else "data alone", REGRESSION: "a regression without physics"}
+    names = {NO_MODEL: "no physics" if plan.families else "data alone", REGRESSION: "a regression on accelerations"}
     yield (
         f"{case.ahead} ahead, {names.get(leader, leader)} ({BEST}) with {runs} errs by "
         f"{case.error(leader, largest, 'H_end')} on average, nine in ten below {metres_text(most)}.{''.join(of_others)}"
@@ -421,7 +421,7 @@ def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Itera
             _, worse, unknown = case.sides(names, lead)
             words += [f"beats {model_list(worse)} {how}"] if worse else []
             words += [f"is not shown to be beaten by {model_list(unknown)} {how}"] if unknown else []
-        one = f"regression without physics on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
+        one = f"regression on accelerations of {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
         yield f"A {one} {'; it '.join(words)}." if words else f"All compared models{too} beat a {one}."
 
 

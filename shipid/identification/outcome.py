@@ -565,7 +565,7 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
     """Warnings if the runs vary no command, or not one of a component with numbers to identify, or a helm by little."""
     said, components = warn_of_constant_commands(dataset, runs), {path.split(".")[1] for path in paths if "." in path}
     held = [name for name in constant_commands(dataset, runs) if name.rpartition(".")[0] in components]
-    helms = dataset.select(runs).frame[list(filter(is_steering, dataset.commands))]
+    helms = dataset.select(runs).frame[[name for name in dataset.commands if is_steering(name)]]
     if said:
         return said
     if held:

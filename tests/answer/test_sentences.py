@@ -66,7 +66,7 @@ def test_the_headline_says_that_a_regression_errs_by_less(made: Any, error: floa
     [
         ({}, 9.0, "good (best in validation) with 30 runs errs by 1.00 m"),
         ({"none": 0.5}, 9.0, "no physics (best in validation) with 30 runs errs by 4.00 m"),
-        ({"none": 0.5}, 0.1, "a regression without physics (best in validation) with 30 runs errs by 2.00 m"),
+        ({"none": 0.5}, 0.1, "a regression on accelerations (best in validation) with 30 runs errs by 2.00 m"),
         ({"none": 0.5}, np.nan, "no physics (best in validation) with 30 runs errs by 4.00 m"),
     ],
 )

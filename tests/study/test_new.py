@@ -433,7 +433,7 @@ def test_a_log_without_commands_is_studied_without_physics(tmp_path: Path, monke
     assert re.search(
         r"^30 s ahead, [a-z ]+ \(best in validation\) with 2 runs errs by [\d.]+ m on average, nine in ten", answer
     )
-    assert "regression without physics on 2 runs" in answer
+    assert "regression on accelerations of 2 runs" in answer
     assert "constant u, v, r" in answer
 
 
