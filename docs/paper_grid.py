@@ -20,16 +20,17 @@ import numpy as np
 import pandas as pd
 
 from shipid import ShipidError, figures, read_plan
-from shipid.metrics import rank_correlation
+from shipid.files import read_arrays
+from shipid.metrics import path_roughness, rank_correlation
 from shipid.report.content import DATA_DRIVEN
 from shipid.study.plan import Plan
 from shipid.study.run import prepare_study, run_study
-from shipid.study.store import read_rows, shard_folder
+from shipid.study.store import paths_file, read_rows, read_test, shard_folder
 from shipid.version import __version__
 
 FILE = Path(__file__).parent / "records" / "paper-grid.csv"
 KERNEL = FILE.with_name("paper-grid-kernel.csv")
-COLUMNS = ["model", "N_D", "A", "H", "H_90", "H_end", "seconds", "version"]
+COLUMNS = ["model", "N_D", "A", "H", "H_90", "H_end", "seconds", "version", "roughness"]
 FIRST = (10, 30, 100)
 """Amounts of data that are computed to the end before the others begin."""
 
@@ -86,7 +87,15 @@ def counts_of_findings(rows: pd.DataFrame) -> list[str]:
         sooner = physics.index[physics[few] < pure[many]]
         if pure[many] == pure[many]:
             lines.append(f"S6: {len(sooner)} models have a lower H with {few} runs than none with {many}.")
-    return [*lines, "S7 needs the paths, which these rows do not hold."]
+    for N_D, rows_of in rows.groupby("N_D"):
+        kept = rows_of.dropna(subset="roughness").set_index("model")["roughness"]
+        if DATA_DRIVEN in kept and len(kept) > 1:
+            joined = kept.drop(DATA_DRIVEN)
+            lines.append(
+                f"S7, N_D = {N_D}: paths without physics are {kept[DATA_DRIVEN]:.2f} times as rough as the true ones, "
+                f"those of {len(joined)} models {joined.min():.2f} to {joined.max():.2f} times."
+            )
+    return lines
 
 
 def beside_kernel(rows: pd.DataFrame, kernel: pd.DataFrame) -> str:
@@ -151,6 +160,7 @@ def main() -> None:
     if given.hours and not given.run.exists():
         for event in prepare_study(plan, given.run):
             print(event.text, file=sys.stderr)
+    true = path_roughness(read_test(given.run)[0].future) if given.run.exists() else float("nan")
     for number in missing_cells(plan, pd.read_csv(FILE)):
         if time.monotonic() > end:
             break
@@ -159,6 +169,9 @@ def main() -> None:
             print(event.text or event.row.get("cell", ""), file=sys.stderr)
         place = shard_folder(given.run, shard)
         row = read_rows(place).rename(columns={"foundation": "model"}).assign(version=__version__)
+        row["roughness"] = [
+            path_roughness(read_arrays(paths_file(place, cell))["paths"]) / true for cell in row["cell"]
+        ]
         row[COLUMNS].to_csv(FILE, mode="a", header=False, index=False)
         shutil.rmtree(place)
     rows, kernel = pd.read_csv(FILE), pd.read_csv(KERNEL)

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from urllib.parse import unquote, urldefrag, urlsplit
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -166,11 +167,16 @@ def test_the_grid_of_the_paper_is_drawn_and_counted() -> None:
     drawn = grid.figures_page().partition("## `kernel`")[2]
     assert drawn.count("Plotly.newPlot") == 3
     errors = {("moderate-1", 10): 2.0, ("moderate-1", 30): 1.0, ("none", 10): 3.0, ("none", 30): 2.5}
-    rows = [{"model": model, "N_D": N_D, "A": 4.0, "H": H, "H_90": 2 * H} for (model, N_D), H in errors.items()]
+    rows = [
+        {"model": model, "N_D": N_D, "A": 4.0, "H": H, "H_90": 2 * H, "roughness": H / 2 if N_D == 30 else np.nan}
+        for (model, N_D), H in errors.items()
+    ]
     said = " ".join(grid.counts_of_findings(pd.DataFrame(rows)))
     assert "S2: H is lower at 30 runs than at 10 for 2 of 2 models." in said
     assert "S1, N_D = 30: 1 of 1 moderate models have a lower H than none." in said
     assert "S6: 1 models have a lower H with 10 runs than none with 30." in said
+    assert "S7, N_D = 30: paths without physics are 1.25 times as rough as the true ones" in said
+    assert "S7, N_D = 10" not in said
 
 
 def test_the_readme_is_short_and_its_files_are_there() -> None:
