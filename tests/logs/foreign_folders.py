@@ -629,6 +629,8 @@ def draw_folder(seed: int, parent: Path) -> Folder:
     )
     every = int(rng.choice([1, 2, 4])) if length < 12 else int(rng.choice([1, 2]))
     records = [record.iloc[::every].reset_index(drop=True) for record in records]
+    pace = float(records[0]["t"].iloc[1]) * (2 if layout == "channels" else 1)  # of the slow rows nothing is held
+    columns = [dataclasses.replace(one, held=one.held * (pace < one.held / 2)) for one in columns]
     ends = np.cumsum([0.0] + [float(record["t"].iloc[-1]) + 300.0 for record in records])
     files: list[LogFile] = []
     stem = pick(["run", "rec", "zz", "LOG", "trial-A"])

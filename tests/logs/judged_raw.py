@@ -9,6 +9,7 @@ import numpy as np
 from shipid.errors import ShipidError
 from shipid.logs.guess.clues import LIKELY, Clue, Suggestion
 from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.defects import OTHER
 from shipid.logs.guess.draft import ENABLED, draft_text
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping, to_si
@@ -31,7 +32,7 @@ def judge_raw(stranger: RawStranger, **known: Any) -> Verdict:
     file = stranger.folder.parent / f"{stranger.folder.name}-draft.toml"
     file.write_text(draft_text(guessed), encoding="utf-8")
     try:
-        names = import_log(read_mapping(file), stranger.folder).runs
+        names = import_log(read_mapping(file), guessed.file).runs
     except ShipidError as error:
         return Verdict("reported", (f"not imported: {error.path or ''}: {error.message}",))
     wrong = [*_columns(guessed, stranger), *_repairs(guessed, stranger), *_runs(guessed, stranger, len(names))]
@@ -78,7 +79,10 @@ def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[str, str]]:
         for one in (true.signal, *true.also)
     }
     commands = sorted(signal for signal in present if signal.endswith((".delta", ".n", ".alpha")))
-    wrong += [("missing", f"{signal} is not read") for signal in commands if signal not in read]
+    for signal in (one for one in commands if one not in read):
+        headers = [one.header for one in stranger.columns if one.signal.removeprefix("actual.") == signal]
+        named = any(header in asked.get(signal.rpartition(".")[2], "") for header in headers)
+        wrong.append(("asked" if named else "missing", f"{signal} is not read"))
     if "r" in present and "r" not in drafted:
         wrong.append(("missing", "r is not read"))
     if {"sog", "cog"} <= present and not {"speed", "u"} & set(drafted):
@@ -149,12 +153,13 @@ def _fault(name: str, column: Suggestion, true: RawColumn | None, mirror: bool) 
 
 
 def _repairs(guessed: Guess, stranger: RawStranger) -> list[tuple[str, str]]:
-    """Repairs that are switched on and mend what was not broken."""
+    """Repairs that are switched on and mend what was not broken; of two that are late, what is between them counts."""
     on = [one for one in guessed.findings if one.repair is not None and one.confidence >= ENABLED]
-    return [("", fault) for finding in on if (fault := _needless(finding, guessed, stranger))]
+    late = {one.repair["signal"]: one.repair["seconds"] for one in on if one.repair and one.repair["kind"] == "latency"}
+    return [("", fault) for finding in on if (fault := _needless(finding, guessed, stranger, late))]
 
 
-def _needless(finding: Clue, guessed: Guess, stranger: RawStranger) -> str:
+def _needless(finding: Clue, guessed: Guess, stranger: RawStranger, delays: dict[str, float]) -> str:
     repair: dict[str, Any] = finding.repair or {}
     units = {column.header: column for column in stranger.columns}
     used = {column.name: _truth(units, column.source) for column in guessed.columns}
@@ -169,7 +174,7 @@ def _needless(finding: Clue, guessed: Guess, stranger: RawStranger) -> str:
             wanted = {"position": place, "velocity": moves, "heading": late("psi"), "yaw rate": late("r")}
             base = {"position": moves, "velocity": place, "heading": late("r"), "yaw rate": late("psi")}
             due = wanted[repair["signal"]] - base[repair["signal"]]
-            off = repair["seconds"] - due
+            off = repair["seconds"] - delays.get(OTHER[repair["signal"]], 0.0) - due
             return f"latency of {repair['signal']} off by {off:.2g} s" if abs(off) > LATE else ""
         case "scale":
             off = repair["factor"] - 1

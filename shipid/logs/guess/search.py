@@ -375,7 +375,8 @@ def _readings(state: State, pose: Pose, seen: Complex, frame: str | None) -> Ite
         return
     others = [*_course_axes(state, pose, seen), *_velocity_axes(state, place, seen)] if pose.misfit < 0.5 else []
     plain = not place.on_globe and not all(
-        meaning_scores(name).get(way, 0.0) > 0.9 for name, way in ((place.first, "north"), (place.second, "east"))
+        meaning_scores(name).get(way, 0.0) > 0.9 and not {"x", "y"} & meaning_scores(name).keys()
+        for name, way in ((place.first, "north"), (place.second, "east"))
     )
     for axes in ALL_AXES:
         cost = _sense_cost(axes.sense(pose.sense), compass, plain and pose.sense == Sense())
@@ -545,9 +546,9 @@ def _names_of_velocities(kind: str, first: str, second: str) -> float:
 
 def _speeds_and_courses(state: State, used: set[str], seen: Complex) -> Iterator[Velocity]:
     """Yield speeds with courses over ground in every unit, in the sense in which they keep to the track."""
-    speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
-    if state.numbered:
-        speeds = courses = state.eligible()[:MOST_COLUMNS]
+    plain = [[name for name in state.movable(one) if not meaning_scores(name)][:MOST_COLUMNS] for one in ("u", "psi")]
+    speeds = [*state.called("speed"), *plain[0]]
+    courses = [*(name for name in state.called("course") if not is_order(name)), *plain[1]]
     middle = (state.chosen.first + state.chosen.last) // 2
     for name in (name for name in dict.fromkeys(courses) if name not in used):
         for turn, more in _turns_of_angle(state, name):
