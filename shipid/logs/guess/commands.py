@@ -119,7 +119,7 @@ def _unknown_place(name: str, names: list[str]) -> str:
             words = [[one[0][:-1], one[0]] for one in words]
         odd = [pair for pair in zip(*words, strict=False) if pair[0] != pair[1]]
         if len(words[0]) == len(words[1]) and len(odd) == 1 and not any(map(is_known_word, odd[0])):
-            return odd[0][0]
+            return str(odd[0][0])
     return ""
 
 
@@ -249,16 +249,12 @@ def _take_unnamed_shafts(state: State, azimuth: bool, used: dict[str, int]) -> N
 
 
 def _alike(state: State, name: str) -> list[str]:
-    """The free columns whose names differ from this one by a side or an unknown word alone, and which range as it."""
-    pairs = [pair for pair in side_pairs(state) if name in pair]
-    free = [one for one in state.free() if _unknown_place(one, [name]) and _range_alike(state, (name, one))]
-    return list(dict.fromkeys(one for one in (*(one for pair in pairs for one in pair), *free) if one != name))
-
-
-def _range_alike(state: State, pair: tuple[str, str]) -> bool:
-    """Whether two columns share more than half of the wider range."""
-    lows, highs = zip(*((values.min(), values.max()) for values in map(state.columns.__getitem__, pair)), strict=True)
-    return bool(min(highs) - max(lows) > max(np.subtract(highs, lows)) / 2)
+    """The free columns whose names differ from this one by a side, or by an unknown word and not much in range."""
+    own, found = state.columns[name], [one for pair in side_pairs(state) if name in pair for one in pair]
+    for one in (one for one in state.free() if _unknown_place(one, [name])):
+        both = np.array([[values.min(), values.max()] for values in (own, state.columns[one])])
+        found += [one] if both[:, 1].min() - both[:, 0].max() > np.ptp(both, axis=1).max() / 2 else []
+    return [one for one in dict.fromkeys(found) if one != name]
 
 
 def _speed_ahead(state: State) -> Array:

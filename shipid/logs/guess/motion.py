@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import STRONG, State, si_unit
+from shipid.logs.guess.clues import LIKELY, STRONG, State, si_unit
 from shipid.logs.guess.evidence import Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
@@ -190,7 +190,7 @@ def _take_velocities(state: State, best: MotionReading, found: Velocity) -> None
     ground = axes.place(found.ground) * factor
     heading = np.exp(1j * state.psi)
     confidence = 0.99 * (1 - min(0.5, fit.left))
-    if found.named < 0.45 and not state.numbered:
+    if found.named < found.sure and not state.numbered:
         confidence = min(confidence, 0.59)
     leaves = f"leaves {100 * fit.left:.2g} % of the track unexplained"
     if found.kind == "course":
@@ -198,6 +198,9 @@ def _take_velocities(state: State, best: MotionReading, found: Velocity) -> None
         why = f"along the course [{turned}] it {leaves}"
         if found.turn in TURNS:
             set_scale(state, second, 360.0 / found.turn, f"a whole turn is {found.turn:g}: {TURNS[found.turn]}")
+        if confidence < LIKELY:
+            words = f"is {first!r} the speed over ground, not through the water, and {second!r} the course?"
+            state.ask(("speed", "course"), f"{words} Not both names say so")
         state.suggest("speed", first, unit, min(0.9, confidence), why)
         sense = _keys_of_sense(axes.sense(found.sense), turned)
         state.suggest("course", second, turned, min(0.9, confidence), why, **sense)

@@ -144,6 +144,11 @@ class Velocity:
     cost: float = 0.0
     unsure: bool = False
 
+    @property
+    def sure(self) -> float:
+        """How well the names have to fit."""
+        return 0.75 if self.kind == "course" else 0.45
+
 
 @dataclass(frozen=True)
 class Rate:
@@ -479,7 +484,7 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
     }
     for one in [*_pairs_of_velocities(state, used, seen, turn), *_speeds_and_courses(state, used, seen)]:
         fit = _fit_of_path(state, seen, one.ground)
-        sure, usual = one.named >= (0.75 if one.kind == "course" else 0.45), _is_speed_unit(fit.scale)
+        sure, usual = one.named >= one.sure, _is_speed_unit(fit.scale)
         against = one.kind != "course" and not {one.first, one.second} <= plain
         limit = SETTINGS.left * steady[one.kind] if against else SETTINGS.named_left if sure else SETTINGS.left
         if fit.scale <= 0 or not (sure or usual) or fit.left > limit:

@@ -70,9 +70,9 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
         more = f"; so are {len(skipped) - 1} others" if len(skipped) > 1 else ""
         raise DataError(f"no file of this folder can be read: {first}: {why}{more}", file=folder)
     if _are_channels(sniffed):
-        first, *others = sorted(sniffed, key=lambda file: -len(sniffed[file].t))
-        log = _join_channels(sniffed[first], {file: sniffed[file] for file in others})
-        return GuessFiles(first, None, {first.stem: first}, skipped, {}, {}, 0, log)
+        longest = max(sniffed, key=lambda file: len(sniffed[file].t))
+        log = _join_channels(longest, sniffed)
+        return GuessFiles(longest, None, {longest.stem: longest}, skipped, {}, {}, 0, log)
     kept = _files_alike(sniffed, folder, skipped)
     runs = {run_name(file, folder, taken): file for file in kept}
     kinds = {run: kind for run, file in runs.items() if (kind := kind_in_name(file.stem))}
@@ -170,27 +170,28 @@ def _are_channels(sniffed: dict[Path, LogTable]) -> bool:
     return alone and together and shared > max(float(np.ptp(log.t)) for log in logs) / 2
 
 
-def _join_channels(first: LogTable, others: dict[Path, LogTable]) -> LogTable:
-    """The columns of files of the same time, each at its own instants; a name that was there gets that of its file."""
-    t = np.unique(np.concatenate([first.t, *(log.t for log in others.values())]))
+def _join_channels(file: Path, logs: dict[Path, LogTable]) -> LogTable:
+    """The columns of a file and of others of its time, each at its own instants; a second of a name gets its file's."""
+    first, others = logs[file], {other: log for other, log in logs.items() if other != file}
+    t = np.unique(np.concatenate([log.t for log in logs.values()]))
     columns, channels = dict[str, Array](), dict[str, tuple[Path, LogTable]]()
     in_parts, fillers = dict(first.in_parts), dict(first.fillers)
-    for file, log in ((None, first), *others.items()):
+    for other, log in {file: first, **others}.items():
         rows = np.searchsorted(t, log.t)
         for name, values in log.columns.items():
-            new = name if name not in columns or file is None else f"{file.stem} {name}"
+            new = f"{other.stem} {name}" if name in columns else name
             columns[new] = np.full(len(t), np.nan)
             columns[new][rows] = values
-            channels |= {} if file is None else {new: (file, log)}
+            channels |= {new: (other, log)} if other != file else {}
             in_parts |= {new: log.in_parts.get(name, (name,))} if new != name or name in log.in_parts else {}
             fillers |= {new: log.fillers[name]} if name in log.fillers else {}
-    names = ", ".join(file.name for file in others)
-    notes = (*first.notes, f"files of the same time are channels of one log: {names}")
+    names = ", ".join(other.name for other in others)
+    notes = (*first.notes, f"files of the same time are channels of one log: import {file.name}, {names} belong to it")
     doubts = first.doubts
     if first.t[0] < np.ptp(first.t):
-        doubts += (f"do the clocks of the files begin at one moment? {names} are read so",)
-    more = {"columns": columns, "channels": channels, "in_parts": in_parts, "fillers": fillers}
-    return replace(first, t=t, notes=notes, doubts=doubts, **more)
+        doubts += (f"do the clocks of the files begin at one moment? {file.name}, {names} are read so",)
+    joined = replace(first, t=t, columns=columns, channels=channels, notes=notes, doubts=doubts)
+    return replace(joined, in_parts=in_parts, fillers=fillers)
 
 
 def _join_files(logs: list[LogTable]) -> LogTable:

@@ -239,5 +239,5 @@ def test_speed_course_and_commands_are_read_in_a_language_that_is_not_known(seed
     read = {one.name: (one.source, one.unit) for one in proposal.columns}
     assert (read["speed"], read["course"]) == ((words[0], "kn"), (words[1], "deg"))
     assert [one.source for one in proposal.columns if one.name.endswith(".delta")] == rudders
-    asked = " ".join(one.sentence for one in proposal.questions if "n" in one.about)
-    assert all(repr(name) in asked for name in shafts)
+    asked = " ".join(one.sentence for one in proposal.questions if {"n", "speed"} & {*one.about})
+    assert all(repr(name) in asked for name in (*shafts, *words[:2]))
