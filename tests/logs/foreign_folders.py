@@ -344,9 +344,10 @@ def clock_cells(kind: str, t: Array, start: datetime.datetime) -> dict[str, list
         case "epoch ns":
             return {"header.stamp": [f"{round(one * 1e3)}000000" for one in epoch]}
         case "sec nsec":
+            ticks = [divmod(round(one * 1e3), 1000) for one in epoch]
             return {
-                "header.stamp.secs": [f"{int(one)}" for one in epoch],
-                "header.stamp.nsecs": [f"{round(one % 1 * 1e3) % 1000}000000" for one in epoch],
+                "header.stamp.secs": [f"{s}" for s, _ in ticks],
+                "header.stamp.nsecs": [f"{ms}000000" for _, ms in ticks],
             }
         case "boot us":
             return {"TimeUS": [f"{(one + 41.7) * 1e6:.0f}" for one in t]}
