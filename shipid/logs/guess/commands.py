@@ -92,7 +92,9 @@ def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]
     for name in sorted(fits, key=lambda one: (still[one], is_order(one), -fits[one][0])):
         side, number = state.side_of(name), number_in_name(name)
         both = f"{side} {number}" if side and number and state.commands else side or number
-        both = both or _unknown_place(name, [one for one in fits if fits[one][1] == fits[name][1]])
+        if not both and (both := _unknown_place(name, [one for one in fits if fits[one][1] == fits[name][1]])):
+            words = "is it of another side than those of like name, and of which, or an order or feedback of the same?"
+            state.ask((fits[name][1],), f"{name!r}: {words} No word of the name says so")
         groups.setdefault((state.command_of(name) or both, fits[name][1]), []).append(name)
     sided = any(place and not str(place).startswith(TUNNELS) for place, _ in groups)
     chosen = []

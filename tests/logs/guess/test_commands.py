@@ -76,6 +76,17 @@ def test_an_angle_in_pulses_is_that_of_a_servo(seed: int) -> None:
     assert any(name in one.sentence and "45 deg is a guess" in one.sentence for one in state.questions)
 
 
+@pytest.mark.parametrize("seed", seeds(2, 8))
+def test_two_rudders_whose_sides_are_words_that_are_not_known_are_both_read_and_asked(seed: int) -> None:
+    """Of two rudders of a Russian ship one was left out."""
+    draw = np.random.default_rng(seed)
+    names = [f"rudder {''.join(draw.choice(list('bcdghjkqvwxz'), 4))}" for _ in range(2)]
+    state = chosen({name: RUDDER + draw.normal(0.0, 0.1, len(T)) for name in names})
+    assert [one.source for one in state.suggestions] == names
+    asked = [one.sentence for one in state.questions if "another side" in one.sentence]
+    assert [sum(repr(name) in one for one in asked) for name in names] == [1, 1]
+
+
 def test_the_side_of_a_rudder_that_is_never_negative_is_asked_and_not_found() -> None:
     state = chosen({"rudder [deg]": 40.0 - RUDDER})
     assert described(state) == {"rudder.delta": ("rudder [deg]", "deg", 1)}
