@@ -159,14 +159,15 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
         raise DataError("holds no line with values", file=file)
     names = _column_names([row for _, row in head], form, file)
     width = max((place + 1 for place, name in enumerate(names) if name), default=1)
-    said = names if form.header and form.names is None else None
+    headed = form.header and form.names is None
+    said = _bare_names(names) if headed or form.names else None
     places = [place for place in range(width) if names[place] in columns] if {*columns} <= {*names} else []
     places = places or [*range(width)]
     pick = operator.itemgetter(*places) if len(places) > 1 else operator.itemgetter(slice(places[0], places[0] + 1))
     blocks: list[pd.DataFrame] = []
     again: list[int] = []
     ragged: dict[int, int] = {}  # line -> its cells
-    rows = itertools.chain(head[said is not None :], rows)
+    rows = itertools.chain(head[headed:], rows)
     while block := list(itertools.islice(rows, ROWS_AT_ONCE)):
         kept: list[str] = []
         for line, row in block:
@@ -174,9 +175,7 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
                 ragged[line] = max(
                     len(row) if len(row) < width else 0, *(k + 1 for k, one in enumerate(row) if one.strip())
                 )
-            elif (
-                said is not None and row[0].strip() == said[0] and [one.strip() for one in row[:width]] == said[:width]
-            ):
+            elif said is not None and _bare_names(row[:1]) == said[:1] and _bare_names(row[:width]) == said[:width]:
                 again.append(line)
             else:
                 kept += pick(row)
@@ -186,6 +185,11 @@ def parse_text(source: str | io.TextIOBase, form: TextFormat, file: Path, column
     table.columns = pd.Index([names[place] for place in places])
     table.attrs["ragged"] = sorted([*again, *ragged])
     return table
+
+
+def _bare_names(cells: Sequence[str]) -> list[str]:
+    """Names without the units in brackets behind them, which may stand in a line of their own."""
+    return [cell.partition(" [")[0].strip() for cell in cells]
 
 
 def _filled_rows(text: io.TextIOBase, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:

@@ -9,6 +9,7 @@ import numpy as np
 from shipid.errors import ShipidError
 from shipid.logs.guess.clues import LIKELY, Clue, Suggestion
 from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.defects import OTHER
 from shipid.logs.guess.draft import ENABLED, draft_text
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping, to_si
@@ -18,6 +19,7 @@ from tests.strangers_raw import RawColumn, RawStranger
 OFF_SCALE, OFF_ANGLE = 0.03, 5.0  # relative; deg
 LATE, ARM, TURNED, FACTOR = 0.6, 0.15, 3.0, 0.05  # s, of the length, deg, relative: of repairs that are switched on
 FIXED = {"latitude": "lat", "longitude": "lon", "u": "u", "v": "v", "r": "r", "speed": "sog", "course": "cog"}
+SHARES = ("%", "us", "share")  # units of commands
 MIRRORED = {"east", "psi", "r", "v"}  # change sign where a frame is taken for its mirror image
 
 
@@ -30,31 +32,45 @@ def judge_raw(stranger: RawStranger, **known: Any) -> Verdict:
     file = stranger.folder.parent / f"{stranger.folder.name}-draft.toml"
     file.write_text(draft_text(guessed), encoding="utf-8")
     try:
-        names = import_log(read_mapping(file), stranger.folder).runs
+        names = import_log(read_mapping(file), guessed.file).runs
     except ShipidError as error:
         return Verdict("reported", (f"not imported: {error.path or ''}: {error.message}",))
     wrong = [*_columns(guessed, stranger), *_repairs(guessed, stranger), *_runs(guessed, stranger, len(names))]
     if not wrong:
         return Verdict("right", ())
     word = "reported" if all(seen for seen, _ in wrong) else "silent"
-    return Verdict(word, tuple(("reported: " if seen else "SILENT: ") + reason for seen, reason in wrong))
+    return Verdict(word, tuple(f"{seen or 'SILENT'}: {reason}" for seen, reason in wrong))
 
 
-def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[bool, str]]:
-    """What is wrong with the columns, and whether the draft says so."""
+def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[str, str]]:
+    """What is wrong with the columns, and how the draft says so.
+
+    "asked" where a question names the right column or unit, or is about a sign; "doubted" where one is about something
+    else of this column, or it is only unsure; "missing" where it is not read; empty where nothing is said.
+    """
     units = {column.header: column for column in stranger.columns}
-    asked = {name for question in guessed.questions for name in question.about}
+    asked = {
+        name: " ".join(question.sentence for question in guessed.questions if name in question.about)
+        for name in {name for question in guessed.questions for name in question.about}
+    }
     drafted = {column.name: (column, _truth(units, column.source)) for column in guessed.columns}
     psi, psi_true = drafted["psi"]
     mirror = _product(psi, psi_true) < 0
-    wrong: list[tuple[bool, str]] = []
+    wrong: list[tuple[str, str]] = []
     if mirror:
-        wrong.append((bool(asked & {"psi", "north", "east"}), "the frame is mirrored"))
+        wrong.append(("asked" if set(asked) & {"psi", "north", "east"} else "", "the frame is mirrored"))
     for name, (column, true) in drafted.items():
-        unsure = column.confidence < LIKELY or bool({name, name.rpartition(".")[2]} & asked)
         fault = _fault(name, column, true, mirror)
-        if fault:
-            wrong.append((unsure, f"{name}: {fault}"))
+        if not fault:
+            continue
+        said = " ".join(asked.get(one, "") for one in {name, name.rpartition(".")[2]})
+        if fault.startswith("from"):
+            fits = [one for one in stranger.columns if not _fault(name, column, one, mirror).startswith("from")]
+            right = {one.header for one in fits}
+        else:
+            right = {true.unit} if true is not None and "times" in fault and "times -" not in fault else set()
+        word = "asked" if said and (not right or any(one in said for one in right)) else "doubted"
+        wrong.append((word if said or column.confidence < LIKELY else "", f"{name}: {fault}"))
     present = {column.signal.removeprefix("actual.") for column in stranger.columns}
     read = {
         one.removeprefix("actual.")
@@ -63,13 +79,16 @@ def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[bool, str]]:
         for one in (true.signal, *true.also)
     }
     commands = sorted(signal for signal in present if signal.endswith((".delta", ".n", ".alpha")))
-    wrong += [(True, f"{signal} is not read") for signal in commands if signal not in read]
+    for signal in (one for one in commands if one not in read):
+        headers = [one.header for one in stranger.columns if one.signal.removeprefix("actual.") == signal]
+        named = any(header in asked.get(signal.rpartition(".")[2], "") for header in headers)
+        wrong.append(("asked" if named else "missing", f"{signal} is not read"))
     if "r" in present and "r" not in drafted:
-        wrong.append((True, "r is not read"))
+        wrong.append(("missing", "r is not read"))
     if {"sog", "cog"} <= present and not {"speed", "u"} & set(drafted):
-        wrong.append((True, "speed and course are not read"))
+        wrong.append(("missing", "speed and course are not read"))
     if {"u", "v"} <= present and not {"speed", "u"} & set(drafted):
-        wrong.append((True, "u and v are not read"))
+        wrong.append(("missing", "u and v are not read"))
     return wrong
 
 
@@ -84,6 +103,8 @@ def _product(column: Suggestion, true: RawColumn | None) -> float:
     if true is None:
         return 0.0
     factor = float(column.extra.get("sign", 1)) * float(column.extra.get("factor", 1.0))
+    if curve := column.extra.get("curve"):
+        factor *= float(np.sign(curve[-1][1] - curve[0][1]))
     return float(factor * to_si(column.unit, column.name) * true.scale)
 
 
@@ -94,10 +115,10 @@ def _fault(name: str, column: Suggestion, true: RawColumn | None, mirror: bool) 
     signals = {one.removeprefix("actual.") for one in (true.signal, *true.also)}
     kind = name.rpartition(".")[2]
     if name == "V_w":
-        return "" if true.signal == ("aws" if true.signal == "aws" else "V_w") else f"from {column.source!r}"
+        return "" if true.signal in ("aws", "tws", "V_w") else f"from {column.source!r}"
     if name == "beta_w":
-        relative = true.signal == "awa"
-        fits = relative == bool(column.extra.get("relative")) and true.signal in ("awa", "wind_from")
+        relative = true.signal in ("awa", "twa")
+        fits = relative == bool(column.extra.get("relative")) and true.signal in ("awa", "twa", "wind_from")
         return "" if fits else f"from {column.source!r}"
     if kind in ("thrust", "torque"):
         if not true.signal.startswith(f"{kind}."):
@@ -118,8 +139,10 @@ def _fault(name: str, column: Suggestion, true: RawColumn | None, mirror: bool) 
             return f"from {column.source!r}, which is {true.signal or 'nothing'}"
         wanted = -1.0 if mirror and name in MIRRORED else 1.0
     product = _product(column, true)
-    if name in ("phi", "theta"):  # their sign is not known from the log
+    if name in ("phi", "theta", "p", "q", "w", "z"):  # their sign is not known from the log
         product, wanted = abs(product), 1.0
+    if true.unit in SHARES:  # the log does not say what all of it is
+        product = float(np.sign(product))
     if abs(product - wanted) > OFF_SCALE:
         return f"from {column.source!r}, times {product:.3g} in place of {wanted:g}"
     if name == "psi":
@@ -129,13 +152,14 @@ def _fault(name: str, column: Suggestion, true: RawColumn | None, mirror: bool) 
     return ""
 
 
-def _repairs(guessed: Guess, stranger: RawStranger) -> list[tuple[bool, str]]:
-    """Repairs that are switched on and mend what was not broken."""
+def _repairs(guessed: Guess, stranger: RawStranger) -> list[tuple[str, str]]:
+    """Repairs that are switched on and mend what was not broken; of two that are late, what is between them counts."""
     on = [one for one in guessed.findings if one.repair is not None and one.confidence >= ENABLED]
-    return [(False, fault) for finding in on if (fault := _needless(finding, guessed, stranger))]
+    late = {one.repair["signal"]: one.repair["seconds"] for one in on if one.repair and one.repair["kind"] == "latency"}
+    return [("", fault) for finding in on if (fault := _needless(finding, guessed, stranger, late))]
 
 
-def _needless(finding: Clue, guessed: Guess, stranger: RawStranger) -> str:
+def _needless(finding: Clue, guessed: Guess, stranger: RawStranger, delays: dict[str, float]) -> str:
     repair: dict[str, Any] = finding.repair or {}
     units = {column.header: column for column in stranger.columns}
     used = {column.name: _truth(units, column.source) for column in guessed.columns}
@@ -150,7 +174,7 @@ def _needless(finding: Clue, guessed: Guess, stranger: RawStranger) -> str:
             wanted = {"position": place, "velocity": moves, "heading": late("psi"), "yaw rate": late("r")}
             base = {"position": moves, "velocity": place, "heading": late("r"), "yaw rate": late("psi")}
             due = wanted[repair["signal"]] - base[repair["signal"]]
-            off = repair["seconds"] - due
+            off = repair["seconds"] - delays.get(OTHER[repair["signal"]], 0.0) - due
             return f"latency of {repair['signal']} off by {off:.2g} s" if abs(off) > LATE else ""
         case "scale":
             off = repair["factor"] - 1
@@ -168,11 +192,11 @@ def _needless(finding: Clue, guessed: Guess, stranger: RawStranger) -> str:
     return ""
 
 
-def _runs(guessed: Guess, stranger: RawStranger, count: int) -> list[tuple[bool, str]]:
+def _runs(guessed: Guess, stranger: RawStranger, count: int) -> list[tuple[str, str]]:
     """Whether there are as many runs as in the files that were read; files left out are named in the draft."""
     out = [one for one in stranger.files if one.path in guessed.source.skipped]
-    wrong = [(True, f"{len(out)} of {len(stranger.files)} files are left out")] if out else []
+    wrong = [("missing", f"{len(out)} of {len(stranger.files)} files are left out")] if out else []
     wanted = sum(len(one.runs) for one in stranger.files if one not in out)
-    if count != wanted:
-        wrong.append((False, f"{count} runs in place of {wanted}"))
+    if wanted and count != wanted:
+        wrong.append(("", f"{count} runs in place of {wanted}"))
     return wrong

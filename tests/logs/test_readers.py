@@ -122,6 +122,25 @@ def test_the_number_of_a_wrong_line_counts_the_comments_before_it(tmp_path: Path
     assert table.attrs["ragged"] == [6]
 
 
+@pytest.mark.parametrize("seed", seeds(3, 20))
+def test_a_header_that_comes_again_is_left_out_with_its_units(seed: int, tmp_path: Path) -> None:
+    """Of a logger that was switched off and on, whose units are a line of their own, a name was taken for a time."""
+    draw = np.random.default_rng(seed)
+    names, units = ("t", "x", "psi"), ("s", *draw.choice(["m", "deg", "kn", ""], 2))
+    lines = [f"{k},{0.5 * k},{k % 7}" for k in range(40)]
+    for place in sorted(draw.choice(np.arange(1, 40), 2, replace=False))[::-1]:
+        lines.insert(place, ",".join(names))
+    form = TextFormat(
+        skip_rows=2,
+        header=False,
+        names=tuple(f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)),
+        ragged="drop",
+    )
+    table = parse_text("\n".join([",".join(names), ",".join(units), *lines]), form, tmp_path)
+    assert table.iloc[:, 0].astype(int).tolist() == list(range(40))
+    assert len(table.attrs["ragged"]) == 2
+
+
 @pytest.mark.parametrize("seed", seeds(2, 5))
 def test_what_a_power_cut_leaves_is_refused(seed: int, tmp_path: Path) -> None:
     """A cell ended at its NUL, and 111.1 became 11."""

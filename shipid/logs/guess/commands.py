@@ -18,6 +18,7 @@ from shipid.logs.guess.words import (
     SOURCES,
     is_electrical,
     is_engine,
+    is_known_word,
     is_order,
     meaning_scores,
     name_parts,
@@ -44,7 +45,7 @@ SHARES = {
 """Words for a share of the largest value -> what that value is in it."""
 OF_ACTUATORS = frozenset(
     "throttle throttles lever levers thrust thruster motor motors engine esc pwm power gas servo rcou "
-    "chan channel out us raw".split()
+    "chan channel out us raw actuator actuators outputs motors".split()
 )
 """Words that say an order of an actuator, and not of which kind."""
 
@@ -66,6 +67,8 @@ def choose_commands(state: State) -> None:
         steered = _take_actuators(state, r, steered, used) or steered
     if not steered:
         _take_unnamed_rudder(state, r, used)
+    if not any(is_command(one.name) and is_shaft(one.name) for one in state.suggestions):
+        _take_unnamed_shafts(state, azimuth, used)
 
 
 def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]]:
@@ -89,11 +92,14 @@ def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]
     for name in sorted(fits, key=lambda one: (still[one], is_order(one), -fits[one][0])):
         side, number = state.side_of(name), number_in_name(name)
         both = f"{side} {number}" if side and number and state.commands else side or number
+        if not both and (both := _unknown_place(name, [one for one in fits if fits[one][1] == fits[name][1]])):
+            words = "is it of another side than those of like name, and of which, or an order or feedback of the same?"
+            state.ask((fits[name][1],), f"{name!r}: {words} No word of the name says so")
         groups.setdefault((state.command_of(name) or both, fits[name][1]), []).append(name)
-    sided = any(place is not None and not str(place).startswith(TUNNELS) for place, _ in groups)
+    sided = any(place and not str(place).startswith(TUNNELS) for place, _ in groups)
     chosen = []
     for (place, signal), names in groups.items():
-        if place is None and sided and is_order(names[0]):
+        if not place and sided and is_order(names[0]):
             continue
         if len(names) > 1:
             rest = ", ".join(map(repr, names[1:]))
@@ -104,11 +110,29 @@ def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]
     return sorted(chosen, key=lambda entry: order.index(entry[0]))
 
 
+def _unknown_place(name: str, names: list[str]) -> str:
+    """The only word in which a name differs from one of others, where neither is known: a side in another language.
+
+    Of a name of one word its last letter, as of `podp` and `pods`.
+    """
+    for other in names:
+        words = [re.findall(r"[^\W\d_]+", one) for one in (name, other)]
+        if len(words[0]) == len(words[1]) == 1:
+            words = [[one[0][:-1], one[0]] for one in words]
+        odd = [pair for pair in zip(*words, strict=False) if pair[0] != pair[1]]
+        if len(words[0]) == len(words[1]) and len(odd) == 1 and not any(map(is_known_word, odd[0])):
+            return str(odd[0][0])
+    return ""
+
+
 # --- angles ---
 
 
 def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, int], sure: bool = True) -> None:
-    """Suggest a column as an angle that steers, with the sign that the yaw rate shows."""
+    """Suggest a column as an angle that steers, with the sign that the yaw rate shows; pulses as those of a servo."""
+    if _are_pulses(state.columns[name]):
+        _take_servo(state, name, state.effect(r, state.columns[name]), used, signal)
+        return
     turned = _centre_angle(state, name, signal)
     unit = likely_unit(state, name, signal)
     extra: dict[str, Any] = {"wrap": True} if turned else {}
@@ -134,9 +158,13 @@ def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, 
         extra["sign"] = -1
     if signal == "alpha":
         _ask_for_half_turn(state, name, unit, int(extra.get("sign", 1)))
+    state.suggest(_angle_of_column(state, name, signal, used), name, unit, confidence, why, **extra)
+
+
+def _angle_of_column(state: State, name: str, signal: str, used: dict[str, int]) -> str:
     side = state.side_of(name)
     component = (f"{side}_rudder" if signal == "delta" else side) if side else SIGNALS[signal].component
-    state.suggest(_command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+    return _command_of_column(state, name, f"{component}.{signal}", used)
 
 
 def _centre_angle(state: State, name: str, signal: str) -> bool:
@@ -195,12 +223,44 @@ def _take_unnamed_rudder(state: State, r: Array, used: dict[str, int]) -> None:
     strength = {}
     for name in state.eligible():
         values = state.columns[name]
-        if 0 < np.abs(values).max() < 95 and name not in screws:
+        if 0 < np.abs(values).max() < 95 and name not in screws and unit_of_another(name, "delta") is None:
             held = 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values)))
             strength[name] = abs(state.effect(r, values)) * held
     likely = max(strength, key=strength.__getitem__, default="")
     if likely and strength[likely] > SETTINGS.seen:
-        _take_angle(state, r, likely, "delta", used, sure=False)
+        for name in (likely, *_alike(state, likely)):
+            _take_angle(state, r, name, "delta", used, sure=False)
+
+
+def _take_unnamed_shafts(state: State, azimuth: bool, used: dict[str, int]) -> None:
+    """Suggest the column that drives the ship most as a shaft, with those of like names; ask where none does."""
+    columns = [name for name in state.eligible() if not meaning_scores(name) and unit_of_another(name, "n") is None]
+    columns = [name for name in columns if not _says_actuator(state, name) or _is_plain_actuator(name)]
+    push = {name: state.effect(_speed_ahead(state), state.columns[name]) for name in columns}
+    likely = max(push, key=push.__getitem__, default="")
+    if likely and (push[likely] > SETTINGS.seen or unit_in_name(likely, "rev/s")):
+        names = (likely, *_alike(state, likely))
+        words = (
+            f"{' and '.join(map(repr, names))}: is it the speed of a shaft, and of which side? The name does not say"
+        )
+        state.ask(("n",), f"{words}; its t value of driving the ship ahead is {push[likely]:.0f}")
+        for name in names:
+            _take_thrust(state, name, "n", azimuth, used)
+    elif columns:
+        state.ask(("n",), f"no column is read as the speed of a shaft: is one of {', '.join(map(repr, columns))}?")
+
+
+def _alike(state: State, name: str) -> list[str]:
+    """The free columns whose names differ from this one by a side, or by an unknown word and not much in range."""
+    own, found = state.columns[name], [one for pair in side_pairs(state) if name in pair for one in pair]
+    for one in (one for one in state.free() if _unknown_place(one, [name])):
+        both = np.array([[values.min(), values.max()] for values in (own, state.columns[one])])
+        found += [one] if both[:, 1].min() - both[:, 0].max() > np.ptp(both, axis=1).max() / 2 else []
+    return [one for one in dict.fromkeys(found) if one != name]
+
+
+def _speed_ahead(state: State) -> Array:
+    return np.real(np.gradient(state.position, state.t) * np.exp(-1j * state.psi))
 
 
 # --- shafts ---
@@ -330,7 +390,7 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     Two that turn the ship against each other are screws of two sides, one that turns it a rudder, one that drives it
     a screw.
     """
-    speed = np.real(np.gradient(state.position, state.t) * np.exp(-1j * state.psi))
+    speed = _speed_ahead(state)
     columns = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and _may_be_actuator(state, name)]
     pairs = [pair for pair in side_pairs(state) if {*pair} <= {*columns}]
     twins = [pair for pair in pairs if _differ_in_motion(state, pair)]
@@ -356,10 +416,11 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         return True
     steers = max(sure, key=lambda name: abs(turn[name]), default="")
     if steers and not steered and abs(turn[steers]) > SETTINGS.seen:
-        _take_servo(state, steers, turn[steers], used)
+        for name in (steers, *_alike(state, steers)):
+            _take_servo(state, name, turn.get(name, turn[steers]), used)
         steered = True
     drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
-    alike = next((pair for pair in pairs if drives in pair and {*pair} <= {*state.free()}), (drives,))
+    alike = (drives, *(_alike(state, drives) if drives else ()))
     seen = bool(drives) and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives]))
     if seen or (drives and _is_plain_actuator(drives)):
         zero, why = _neutral_value(state, drives)
@@ -376,19 +437,19 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
     return steered
 
 
-def _take_servo(state: State, name: str, effect: float, used: dict[str, int]) -> None:
+def _take_servo(state: State, name: str, effect: float, used: dict[str, int], signal: str = "delta") -> None:
     """Suggest pulses or a share as an angle: 45 deg at the largest value is a guess, and asked."""
     zero, why = _neutral_value(state, name)
     full = 400.0 if _are_pulses(state.columns[name]) else float(np.abs(state.columns[name] - zero).max())
     factor = float(f"{45.0 / full:.6g}")
     state.turning[name] = float(np.sign(effect))
-    sign = {"sign": -1} if effect < 0 else {}
+    sign = {"sign": -1} if (effect > 0) != (SIGNALS[signal].turns > 0) else {}
     words = f"{name!r} turns the ship to {'starboard' if effect > 0 else 'port'} above {zero:g}: which angle is"
     state.ask(
         ("delta", "alpha"), f"{words} {zero + full:g}? 45 deg is a guess; is it a rudder, or an outboard that swivels?"
     )
     extra = {"factor": factor, "offset": -sign.get("sign", 1) * factor * zero, **sign}
-    column = _command_of_column(state, name, "rudder.delta", used)
+    column = _angle_of_column(state, name, signal, used)
     state.suggest(column, name, "deg", 0.5, f"it turns the ship (t value {abs(effect):.0f}){why}", **extra)
 
 

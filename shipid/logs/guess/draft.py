@@ -19,7 +19,16 @@ from shipid.logs.guess.clues import LIKELY, Clue, Suggestion
 from shipid.logs.guess.columns import Guess
 from shipid.logs.guess.lapses import FILLS
 from shipid.logs.importing import file_digest, import_log
-from shipid.logs.mapping import Mapping, Segment, degrees_and_minutes, is_date, is_dated, parse_mapping, to_si
+from shipid.logs.mapping import (
+    FileClock,
+    Mapping,
+    Segment,
+    degrees_and_minutes,
+    is_date,
+    is_dated,
+    parse_mapping,
+    to_si,
+)
 from shipid.logs.readers import LARGE
 from shipid.physics.signals import is_command
 
@@ -123,7 +132,7 @@ def _draft_head(guess: Guess) -> Iterator[str]:
     yield from (f"# ? {words}" for words in (*(one.sentence for one in guess.questions), *QUESTIONS, *wind))
     yield from _toml_lines({"name": guess.file.stem or "log"})
     if source.pattern is None:
-        yield from _block("source", {"sha256": file_digest(guess.file)})
+        yield from _block("source", {} if sniffed.channels else {"sha256": file_digest(guess.file)})
     else:
         alike = [name for name in source.skipped if name.endswith(source.pattern.rpartition("*")[2])]
         remark = f"{len(source.files)} files, {'see [parts]' if source.parts else 'one run each'}"
@@ -148,10 +157,19 @@ def _draft_head(guess: Guess) -> Iterator[str]:
     ]
     if sparse or sniffed.scattered:
         why = f"{', '.join(map(repr, sparse))} has values where it changes: held in between"
-        why = "sentences or topics have other instants; this is the step of the position" if sniffed.scattered else why
+        why = (
+            "sentences, topics or files have other instants; this is the step of the position"
+            if sniffed.scattered
+            else why
+        )
         yield f"step = {usual:g}    # s: {why}"
     if sniffed.scattered or guess.kinds & {"holes in time", "missing values"}:
         yield f"max_gap = {longest:g}    # s: missing for less: interpolated, for more: the run breaks"
+    for file, log in dict(sniffed.channels.values()).items():
+        clock = {key: value for key, value in log.clock.items() if key in FileClock.model_fields or key == "from"}
+        name = f"file.{tomlkit.key(file.stem).as_string()}"
+        for part, values in (("", {"path": file.name}), (".clock", clock), (".format", log.form)):
+            yield from _block(name + part, values)
 
 
 def _is_sparse_order(guess: Guess, column: Suggestion, longest: float) -> bool:
@@ -185,6 +203,9 @@ def _column_lines(guess: Guess) -> Iterator[str]:
         none = dict.fromkeys(x for one in {column.source, *parts} for x in guess.sniffed.fillers.get(one, ()))
         values = {"from": parts[0] if len(parts) == 1 else parts, "unit": column.unit, **column.extra}
         values |= {"missing": list(none)} if none else {}
+        values |= (
+            {"file": guess.sniffed.channels[column.source][0].stem} if column.source in guess.sniffed.channels else {}
+        )
         key = f'"{column.name}"' if "." in column.name else column.name
         yield from _block(f"columns.{key}", values, f"{sure}: {column.evidence}")
     yield ""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shipid.logs.guess import evidence
-from shipid.logs.guess.clues import STRONG, State, si_unit
+from shipid.logs.guess.clues import LIKELY, STRONG, State, si_unit
 from shipid.logs.guess.evidence import Fit
 from shipid.logs.guess.scales import KNOTS, TURNS, set_scale
 from shipid.logs.guess.search import (
@@ -190,18 +190,22 @@ def _take_velocities(state: State, best: MotionReading, found: Velocity) -> None
     ground = axes.place(found.ground) * factor
     heading = np.exp(1j * state.psi)
     confidence = 0.99 * (1 - min(0.5, fit.left))
+    if found.named < found.sure and not state.numbered:
+        confidence = min(confidence, 0.59)
     leaves = f"leaves {100 * fit.left:.2g} % of the track unexplained"
     if found.kind == "course":
         turned = "rad" if found.turn < 7.0 else "deg"
         why = f"along the course [{turned}] it {leaves}"
         if found.turn in TURNS:
             set_scale(state, second, 360.0 / found.turn, f"a whole turn is {found.turn:g}: {TURNS[found.turn]}")
-        state.suggest("speed", first, unit, 0.9, why)
-        state.suggest("course", second, turned, 0.9, why, **_keys_of_sense(axes.sense(found.sense), turned))
+        if confidence < LIKELY:
+            words = f"is {first!r} the speed over ground, not through the water, and {second!r} the course?"
+            state.ask(("speed", "course"), f"{words} Not both names say so")
+        state.suggest("speed", first, unit, min(0.9, confidence), why)
+        sense = _keys_of_sense(axes.sense(found.sense), turned)
+        state.suggest("course", second, turned, min(0.9, confidence), why, **sense)
     else:
         why = f"integrated as {found.kind}-fixed [{unit}] it {leaves}"
-        if found.named < 0.45 and not state.numbered:
-            confidence = min(confidence, 0.59)
         _suggest_two(state, best, found, unit, confidence, why)
     state.velocity, state.body = ground, np.asarray(ground / heading)
     seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, ground)))

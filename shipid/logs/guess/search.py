@@ -144,6 +144,11 @@ class Velocity:
     cost: float = 0.0
     unsure: bool = False
 
+    @property
+    def sure(self) -> float:
+        """How well the names have to fit."""
+        return 0.75 if self.kind == "course" else 0.45
+
 
 @dataclass(frozen=True)
 class Rate:
@@ -375,7 +380,8 @@ def _readings(state: State, pose: Pose, seen: Complex, frame: str | None) -> Ite
         return
     others = [*_course_axes(state, pose, seen), *_velocity_axes(state, place, seen)] if pose.misfit < 0.5 else []
     plain = not place.on_globe and not all(
-        meaning_scores(name).get(way, 0.0) > 0.9 for name, way in ((place.first, "north"), (place.second, "east"))
+        meaning_scores(name).get(way, 0.0) > 0.9 and not {"x", "y"} & meaning_scores(name).keys()
+        for name, way in ((place.first, "north"), (place.second, "east"))
     )
     for axes in ALL_AXES:
         cost = _sense_cost(axes.sense(pose.sense), compass, plain and pose.sense == Sense())
@@ -478,7 +484,7 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
     }
     for one in [*_pairs_of_velocities(state, used, seen, turn), *_speeds_and_courses(state, used, seen)]:
         fit = _fit_of_path(state, seen, one.ground)
-        sure, usual = one.named >= (0.75 if one.kind == "course" else 0.45), _is_speed_unit(fit.scale)
+        sure, usual = one.named >= one.sure, _is_speed_unit(fit.scale)
         against = one.kind != "course" and not {one.first, one.second} <= plain
         limit = SETTINGS.left * steady[one.kind] if against else SETTINGS.named_left if sure else SETTINGS.left
         if fit.scale <= 0 or not (sure or usual) or fit.left > limit:
@@ -545,9 +551,9 @@ def _names_of_velocities(kind: str, first: str, second: str) -> float:
 
 def _speeds_and_courses(state: State, used: set[str], seen: Complex) -> Iterator[Velocity]:
     """Yield speeds with courses over ground in every unit, in the sense in which they keep to the track."""
-    speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
-    if state.numbered:
-        speeds = courses = state.eligible()[:MOST_COLUMNS]
+    plain = [[name for name in state.movable(one) if not meaning_scores(name)][:MOST_COLUMNS] for one in ("u", "psi")]
+    speeds = [*state.called("speed"), *plain[0]]
+    courses = [*(name for name in state.called("course") if not is_order(name)), *plain[1]]
     middle = (state.chosen.first + state.chosen.last) // 2
     for name in (name for name in dict.fromkeys(courses) if name not in used):
         for turn, more in _turns_of_angle(state, name):

@@ -83,7 +83,7 @@ class LogTable:
     clock begins again with each. sides : letters that columns beside positions hold. words : columns of words, with
     their first. other : columns that cannot be read, and why. in_parts : of several.
     doubts : questions on other clocks.
-    fillers : column -> numbers that stand for no value of it.
+    fillers : column -> numbers that stand for no value of it. channels : column -> the further file that it is in.
     """
 
     form: dict[str, Any]
@@ -99,11 +99,12 @@ class LogTable:
     doubts: tuple[str, ...] = ()
     in_parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     fillers: dict[str, list[float]] = field(default_factory=dict)
+    channels: dict[str, tuple[Path, LogTable]] = field(default_factory=dict)
 
     @property
     def scattered(self) -> bool:
-        """Whether a row is a single sentence, so that empty cells are no defect."""
-        return READERS[self.form.get("kind", "text")].scattered
+        """Whether a row is a single sentence, or of one file of several, so that empty cells are no defect."""
+        return READERS[self.form.get("kind", "text")].scattered or bool(self.channels)
 
 
 def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:

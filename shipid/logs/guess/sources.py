@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shipid.data.dataset import Array
 from shipid.errors import DataError, ShipidError
 from shipid.logs.guess.sniff import SAMPLE, LogTable, recognise_log
 from shipid.logs.guess.words import is_run
@@ -68,6 +69,10 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
         first, why = next(iter(skipped.items()), ("no file", f"none is called {patterns[-1]!r}"))
         more = f"; so are {len(skipped) - 1} others" if len(skipped) > 1 else ""
         raise DataError(f"no file of this folder can be read: {first}: {why}{more}", file=folder)
+    if _are_channels(sniffed):
+        longest = max(sniffed, key=lambda file: len(sniffed[file].t))
+        log = _join_channels(longest, sniffed)
+        return GuessFiles(longest, None, {longest.stem: longest}, skipped, {}, {}, 0, log)
     kept = _files_alike(sniffed, folder, skipped)
     runs = {run_name(file, folder, taken): file for file in kept}
     kinds = {run: kind for run, file in runs.items() if (kind := kind_in_name(file.stem))}
@@ -153,6 +158,40 @@ def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str,
     if not kept:
         raise DataError("no two files have the same columns: guess them one by one", file=folder)
     return kept
+
+
+def _are_channels(sniffed: dict[Path, LogTable]) -> bool:
+    """Whether the files of a folder are of the same time, and most of their columns are in one of them alone."""
+    logs = [*sniffed.values()]
+    names = Counter(name for log in logs for name in log.columns)
+    shared = min(log.t[-1] for log in logs) - max(log.t[0] for log in logs)
+    alone = sum(count == 1 for count in names.values()) > len(names) / 2
+    together = len({file.parent for file in sniffed}) == 1 < len(logs)
+    return alone and together and shared > max(float(np.ptp(log.t)) for log in logs) / 2
+
+
+def _join_channels(file: Path, logs: dict[Path, LogTable]) -> LogTable:
+    """The columns of a file and of others of its time, each at its own instants; a second of a name gets its file's."""
+    first, others = logs[file], {other: log for other, log in logs.items() if other != file}
+    t = np.unique(np.concatenate([log.t for log in logs.values()]))
+    columns, channels = dict[str, Array](), dict[str, tuple[Path, LogTable]]()
+    in_parts, fillers = dict(first.in_parts), dict(first.fillers)
+    for other, log in {file: first, **others}.items():
+        rows = np.searchsorted(t, log.t)
+        for name, values in log.columns.items():
+            new = f"{other.stem} {name}" if name in columns else name
+            columns[new] = np.full(len(t), np.nan)
+            columns[new][rows] = values
+            channels |= {new: (other, log)} if other != file else {}
+            in_parts |= {new: log.in_parts.get(name, (name,))} if new != name or name in log.in_parts else {}
+            fillers |= {new: log.fillers[name]} if name in log.fillers else {}
+    names = ", ".join(other.name for other in others)
+    notes = (*first.notes, f"files of the same time are channels of one log: import {file.name}, {names} belong to it")
+    doubts = first.doubts
+    if first.t[0] < np.ptp(first.t):
+        doubts += (f"do the clocks of the files begin at one moment? {file.name}, {names} are read so",)
+    joined = replace(first, t=t, columns=columns, channels=channels, notes=notes, doubts=doubts)
+    return replace(joined, in_parts=in_parts, fillers=fillers)
 
 
 def _join_files(logs: list[LogTable]) -> LogTable:

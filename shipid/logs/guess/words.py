@@ -92,8 +92,8 @@ PHRASES: dict[str, str] = {
     "ned north, delta north, dist north",
     "east": "e, east, x east, y east, est, y 0, y n, y ned, y earth, eta 2, y e, utm e, utm east, utm x, ye, ned e, "
     "ned east, delta east, dist east",
-    "x": "x, xpos, posx, x coordinate, enu x",
-    "y": "y, ypos, posy, y coordinate, enu y",
+    "x": "x, x 0, xpos, posx, x coordinate, enu x",
+    "y": "y, y 0, ypos, posy, y coordinate, enu y",
     "psi": "psi, heading, gyro, compass, yaw, yaw 0, prow, bow angle, bow direction, ahead course, ahead direction, "
     "eta 3, eta 6, theta z, course, steered course, rw course",
     "speed": "speed, speed over ground, speed ground, sog, u, v, vg, v g, fug, fueg, uog, vog, fog, speed og, abs "
@@ -101,9 +101,9 @@ PHRASES: dict[str, str] = {
     "course": "course, course over ground, course ground, heading over ground, heading ground, cog, crs, track, "
     "track angle, track over ground, track ground, chi, kueg, kug, kog, tmg, course og, course made good, track made "
     "good, beholden course, heading efectivo",
-    "u": "u, vx, surge, surge speed, long speed, fwd speed, ahead speed, x speed, u speed, v x, v long, v fwd, v "
+    "u": "u, u g, vx, surge, surge speed, long speed, fwd speed, ahead speed, x speed, u speed, v x, v long, v fwd, v "
     "surge, nu 1, x dot, u body, linear x",
-    "v": "v, vy, sway, sway speed, trans speed, lat speed, drift speed, starboard speed, stbd speed, y speed, v "
+    "v": "v, v g, vy, sway, sway speed, trans speed, lat speed, drift speed, starboard speed, stbd speed, y speed, v "
     "speed, v y, v trans, v lat, v stbd, v sway, nu 2, y dot, v body, linear y",
     "velocity_north": "vn, vx, v n, v north, north speed, n speed, ned n speed, enu y speed, x speed, v x, x dot",
     "velocity_east": "ve, vy, v e, v east, east speed, est speed, e speed, ned e speed, enu x speed, y speed, v y, y "
@@ -426,10 +426,15 @@ def _known_words() -> frozenset[str]:
     return frozenset(word for word in words | ORDERS | SOURCES | RUN_WORDS if len(word) > 2)
 
 
+def is_known_word(word: str) -> bool:
+    """Whether a word says a quantity, a source, an order or a run in one of the languages, alone or in parts."""
+    return any(part in _known_words() or len(part) < 2 for part in name_parts(word))
+
+
 @cache
 def _split_word(word: str) -> tuple[str, ...]:
     """Cut a word that is no known one into known words, such as `ruderwinkel`; return it whole where it cannot be."""
-    known = _known_words()
+    known = _known_words() | {one for side in SIDE_WORDS for one in words_of_side(side) if len(one) > 3}
     if word in WHOLE:
         return WHOLE[word]
     if word in known or not 6 <= len(word) <= LONGEST_WORD:
@@ -494,7 +499,7 @@ def is_magnetic(name: str) -> bool:
 def side_in_name(name: str) -> str | None:
     """The side or place in a name, such as `port`; None if there is none."""
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", _plain_name(name)))  # 1/s is no starboard
-    parts = set(name_parts(name)) | set(re.split(r"[^a-z]+", bare.lower()))
+    parts = set(name_parts(name)) | set(re.split(r"[\W\d_]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:
             return side

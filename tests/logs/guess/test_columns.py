@@ -12,6 +12,7 @@ import pytest
 
 from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess, guess
+from tests.drawn import seeds
 from tests.logs.simulated import KNOT, as_bridge, guess_of, si_log
 
 
@@ -222,3 +223,21 @@ def test_the_motion_is_read_whatever_the_word(names: tuple[str, ...], asked: tup
     assert read == dict(zip(("r", "u", "v"), zip(names, ("deg/min", "kn", "kn"), strict=True), strict=True))
     doubted = [one.about for one in proposal.questions if "By its name it is another quantity" in one.sentence]
     assert sorted(doubted) == sorted((name,) for name in asked)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 12))
+def test_speed_course_and_commands_are_read_in_a_language_that_is_not_known(seed: int, tmp_path: Path) -> None:
+    """In a log of Polish names speed, course and the second rudder were left out without a word."""
+    draw, log = np.random.default_rng(seed), si_log(seed)
+    words = ["".join(draw.choice(list("bcdghjkqvwxz"), 8)) for _ in range(6)]
+    rudders, shafts = ([f"{words[k]} {side}" for side in words[4:]] for k in (2, 3))
+    ground = (log["u"] + 1j * log["v"]).to_numpy() * np.exp(1j * log["psi"].to_numpy())
+    frame = as_bridge(log).drop(columns=["u", "v", "rpm", "rudder"])
+    frame[words[0]], frame[words[1]] = np.abs(ground) / KNOT, np.degrees(np.angle(ground)) % 360.0
+    frame = frame.assign(**dict.fromkeys(rudders, np.degrees(log["alpha"])), **dict.fromkeys(shafts, 60.0 * log["n"]))
+    proposal = guess_of(tmp_path, frame.round(4))
+    read = {one.name: (one.source, one.unit) for one in proposal.columns}
+    assert (read["speed"], read["course"]) == ((words[0], "kn"), (words[1], "deg"))
+    assert [one.source for one in proposal.columns if one.name.endswith(".delta")] == rudders
+    asked = " ".join(one.sentence for one in proposal.questions if {"n", "speed"} & {*one.about})
+    assert all(repr(name) in asked for name in (*shafts, *words[:2]))

@@ -8,6 +8,7 @@ import pytest
 from shipid.logs.guess.clues import LIKELY, State
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.motion import report_misnomers
+from tests.drawn import seeds
 from tests.logs.simulated import si_log, state_with_pose
 
 LOG = si_log()
@@ -60,6 +61,30 @@ def test_an_azimuth_angle_of_half_a_turn_ahead_is_asked(middle: float, sign: int
     asked = [question.sentence for question in state.questions if question.about == ("alpha",)]
     assert len(asked) == (middle == 180.0 and turns > 0)
     assert all(f"write offset = {-sign * 180} (deg)" in sentence for sentence in asked)
+
+
+@pytest.mark.parametrize("seed", seeds(3, 12))
+def test_an_angle_in_pulses_is_that_of_a_servo(seed: int) -> None:
+    """A rudder of 1157 to 1843 us was read in degrees, and its middle as half a turn."""
+    draw = np.random.default_rng(seed)
+    sign, most = int(draw.choice([-1, 1])), float(draw.uniform(100.0, 500.0))
+    name, signal = (("rudder", "delta"), ("azimuth", "alpha"))[seed % 2]
+    state = chosen({name: 1500.0 + sign * most * RUDDER / np.abs(RUDDER).max()})
+    ((source, unit, counted),) = described(state).values()
+    assert (source, unit, counted) == (name, "deg", sign * (1 if signal == "delta" else -1))
+    assert state.suggestions[0].name.endswith(signal)
+    assert any(name in one.sentence and "45 deg is a guess" in one.sentence for one in state.questions)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 8))
+def test_two_rudders_whose_sides_are_words_that_are_not_known_are_both_read_and_asked(seed: int) -> None:
+    """Of two rudders of a Russian ship one was left out."""
+    draw = np.random.default_rng(seed)
+    names = [f"rudder {''.join(draw.choice(list('bcdghjkqvwxz'), 4))}" for _ in range(2)]
+    state = chosen({name: RUDDER + draw.normal(0.0, 0.1, len(T)) for name in names})
+    assert [one.source for one in state.suggestions] == names
+    asked = [one.sentence for one in state.questions if "another side" in one.sentence]
+    assert [sum(repr(name) in one for one in asked) for name in names] == [1, 1]
 
 
 def test_the_side_of_a_rudder_that_is_never_negative_is_asked_and_not_found() -> None:

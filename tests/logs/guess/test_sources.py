@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -13,6 +14,7 @@ from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_mapping
 from shipid.logs.guess.sources import read_source
 from shipid.logs.importing import import_log, read_mapping
+from tests.drawn import seeds
 from tests.logs.simulated import as_bridge, si_log
 
 LOG = as_bridge(si_log()).round(4)
@@ -101,3 +103,22 @@ def test_a_clock_that_begins_again_with_each_run_is_one_of_each_run(
     expected = ("all out", "all home", "all out (2)") if names[0] == "out" else tuple(f"all {name}" for name in names)
     assert dataset.runs == list(expected)
     assert dataset.metadata["clock"] == "run"
+
+
+@pytest.mark.parametrize("seed", seeds(2, 12))
+def test_files_of_the_same_time_are_channels_of_one_log(seed: int, tmp_path: Path) -> None:
+    """A folder of position, attitude and actuators, each in a file, was refused: no column can be the position."""
+    draw, names = np.random.default_rng(seed), list(LOG.columns[1:])
+    draw.shuffle(names)
+    cuts = np.sort(draw.choice(np.arange(1, len(names)), 2, replace=False))
+    for number, group in enumerate(np.split(np.array(names), cuts)):
+        every = int(draw.integers(1, 4))
+        LOG.iloc[number % every :: every][["time", *group]].to_csv(tmp_path / f"part {number}.csv", index=False)
+    proposal = guess(tmp_path)
+    draft = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
+    rows = import_log(read_mapping(draft).model_copy(update={"segment": ()}), proposal.file).frame
+    for name, source in (("north", "N"), ("east", "E"), ("u", "u")):
+        true = np.interp(rows["t"], LOG["time"], LOG[source])
+        assert np.abs(rows[name] - true).max() < (1.0 if name != "u" else 0.2)
+    assert {"propeller.n", "rudder.delta"} <= {*rows.columns}
+    assert any("begin at one moment" in one.sentence for one in proposal.questions)
