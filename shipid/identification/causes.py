@@ -309,7 +309,7 @@ def _sensor_causes(scales: Scales) -> Iterator[Cause]:
     same = {"u": of_log + drift, "velocity": of_log + drift, "r": ("sensor r bias",)}
     for key, (names, rows) in scaled.items():
         yield Cause(
-            f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.01, ratio=True, scaled=rows, starts=UNITS,
+            f"sensor {key} scale", partial(_divide, names), (0.03,), "1", 0.003, ratio=True, scaled=rows, starts=UNITS,
             repair=f'[[repair]]\nkind = "scale"\ncolumns = {[*names]}\nfactor = {{over0}}',
             equals=same.get(key, ()), tells=SPEEDS, cost=float(key == "u"),
         )  # fmt: skip
@@ -375,7 +375,7 @@ def _water_causes(motion: Motion, scales: Scales) -> Iterator[Cause]:
     )  # fmt: skip
     if "V_w" in motion.columns and np.any(motion.columns["V_w"]):
         yield Cause(
-            "wind scale", partial(_divide, ["V_w"]), (0.05,), "1", 0.05, ratio=True, equals=("coefficient wind",),
+            "wind scale", partial(_divide, ["V_w"]), (0.05,), "1", 0.05, ratio=True, equals=("force of the wind",),
             repair="[columns.V_w]\nfactor = {over0}  # times what is there", tells="the wind read at rest",
         )  # fmt: skip
         yield Cause("wind direction", partial(_subtract, "beta_w"), (0.1,), "rad", 0.05)

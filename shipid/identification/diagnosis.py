@@ -34,27 +34,26 @@ estimated without a part of the runs (or of the time, where there is one run) an
 The causes of least misfit also predict paths of 5 ship lengths, whose errors count as a seventh equation. How far noise
 makes them err is seen on the log with its noise once more.
 
-- `none`: no cause lowers the misfit by `DECISIVE` for each bump, or `UNRIVALLED` times as much as any of another class
-  (what physics lacks is made up for by several), or by more standard errors over blocks of time than the best of so
-  many causes has by chance (normal, with probability `LEVEL`: Bonferroni); or those that do so lower the error of the
-  paths by less than a share `WORTH` of that of the log as given; or that error is noise; or they are smaller than what
-  a log has anyhow (a command that is a row late). Of a cause without a size, which cannot be there in part, the share
-  `DISCRETE` of `DECISIVE` and `WORTH` is enough.
-- A cause that lowers the misfit of the equations of heading and position by `PLAIN` for each bump needs neither:
-  kinematics hold for every ship, and paths may drown in noise.
+- What a cause lowers the misfit by is a logarithm of a ratio of likelihoods. Its *proof* is all that it gains in the
+  equations of heading and position, as kinematics hold for every ship, and of the rest, which a defect of the physics
+  may make as well, the share of the error of the paths that it explains, noise apart.
+- `none`: no proof exceeds ln(n / `LEVEL`): chance gives that once in n / `LEVEL` times, and n causes are tried (Ville,
+  Bonferroni), and none gains as many standard errors over blocks of time as chance gives so rarely (normal); or the
+  proof of those that do so is less than a share `WORTH` of the gain; or paths err by noise alone; or the causes are
+  smaller than what a log has anyhow (a command that is a row late).
 - Causes tie with that of least misfit where they are worse by less than `APART` standard errors, or the share `ALIKE`
-  of its gain. The first that explains a share `WORTH` is named; of those that need neither, one of a whole instrument,
-  then the best by kinematics. If others do so, its equals apart, the answer is `cannot tell`, and `equals` are these
+  of its gain. The first that is proved is named; of those that kinematics alone prove, one of a whole instrument, then
+  the best by kinematics. If others do so, its equals apart, the answer is `cannot tell`, and `equals` are these
   causes; if its class does, these are `equals`.
 - Of a heading that is a course and has lost its drift, sway is that of the physics with whatever else is repaired.
 - Where no cause is named, or two are of forces, all coefficients are fitted at once: `several coefficients` must be
-  better than chance and explain a share `WORTH`. What is left then is judged by itself. A zero of an angle beside wrong
-  forces is said where it is better by a standard error: mirror images tell it.
+  proved by a share above `WORTH`. What is left then is judged by itself. A zero of an angle beside wrong forces is said
+  where it is better by a standard error: mirror images tell it.
 - `unexplained` is a misfit without a name that leaves more than a share `POOR` of the error of constant u, v, r.
 - `current by run` must lower the misfit more than an unknown force of each run, such as a wind that the log lacks, and
   by more than the share `ALIKE` than any other cause.
-- A second cause is looked for once the log is repaired from the best, also where that gains `DECISIVE` but is not worth
-  naming alone: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
+- A second cause is looked for once the log is repaired from the best, also where a share `WORTH` would prove it but is
+  not explained: then the best is sought again beside the second. A rival that gains as much as before (`BOTH`) is there
   as well.
 """
 
@@ -114,17 +113,14 @@ ROUNDS, HALVINGS, SETTLED = 6, 3, 0.02
 MOST_FORCES, WEIGHINGS = 20, 3  # evaluations of a fit of the forces alone with the same weights; such fits
 CALM = 1e-3  # of SMOOTH: the least smoothing where forces are fitted, which SMOOTH would bias without noise
 MOST_RATIO = np.log(2.5)  # a factor beyond is no error of a scale, but hides what it multiplies
-PLAIN = 0.1  # of the misfit of kinematics for each bump: so much shows a cause, whatever physics says
 MOST_SIZES = 2  # that a sentence names
 HUGE = 1e30  # residual where the physics fails
 FINALISTS, LOST = 8, 10.0  # causes whose paths are compared; ship lengths of error of a path that diverges
 # pieces of a log over which it is seen whether a shaft turns astern; steps of a piece; rounds
 SIGN, SIGN_STEPS, SIGN_ROUNDS = 1.0, 4, 4
-LEVEL, APART = 0.05, 2.0  # probability that any cause is so good by chance; standard errors
+LEVEL, APART = 0.02, 2.0  # share of sound logs that may be blamed; standard errors
 BOTH = 0.5  # share of its gain that a rival keeps once the log is repaired from the best: both are there
-UNRIVALLED = 7.0  # times the gain of any cause of another class: so much no defect of the physics gives
-DECISIVE, ALIKE = 2.0, 0.3  # gain for each bump that needs no standard error; share of a gain that a runner-up may lack
-WORTH, DISCRETE = 0.2, 0.25  # share of the error of the paths; of both thresholds, for a cause without a size
+WORTH, ALIKE = 0.2, 0.3  # share of the error of the paths; share of a gain that a runner-up may lack
 POOR = 0.5  # of the error of held u, v, r: of 12 drawn ships 1 truth errs more, and 10 first guesses
 STATES = ("u", "v", "r", "psi", "north", "east")
 
@@ -414,9 +410,9 @@ class _Log:
         return self.worth / 2 * float(np.log((z**2).mean(axis=1) + self.noise**2).sum())
 
     def plainness(self, fit: _Fit) -> float:
-        """By how much a cause lowers the misfit of kinematics alone, for each bump."""
+        """By how much a cause lowers the misfit of kinematics alone."""
         before, after = ((z[3:] ** 2).mean(axis=1) + self.noise[3:] ** 2 for z in (self.plain_residuals, fit.left_out))
-        return fit.counts * float(np.log(before / after).sum()) / 2
+        return fit.counts * self.worth / 2 * max(float(np.log(before / after).sum()), 0.0)
 
     def needs_runs(self, fit: _Fit, rest: float) -> bool:
         """Whether a cause by run gains more than an unknown force of each run, and than another with misfit `rest`.
@@ -693,7 +689,7 @@ def diagnose(
 def _describe_zeros(log: _Log, causes: Sequence[Cause], *found: Diagnosis) -> str:
     """Zeros of angles that show beside wrong forces, in words: mirror images tell them, however far paths err."""
     names, words = {result.cause for result in found}, ""
-    if UNEXPLAINED not in names and not any(one.is_of_forces for one in causes if one.name in names):
+    if not names & {UNEXPLAINED, SEVERAL, *(one.name for one in causes if one.is_of_forces)}:
         return words
     given = log.plain_residuals, log.path_errors(log.motion)
     for fit in (log.estimate(one) for one in causes if one.equals == (ASYMMETRY,) and one.name not in names):
@@ -731,30 +727,28 @@ def _judge(log: _Log, causes: Sequence[Cause]) -> tuple[Diagnosis, _Fit | None]:
     misfits = {key: log.misfit(fit.left_out) + fit.cause.cost - log.misfit(given[0]) for key, fit in fits.items()}
     order = sorted(misfits, key=misfits.__getitem__)
     seen = {key: (fits[key].left_out, log.path_errors(fits[key].motion)) for key in order[:FINALISTS]}
-    misfits |= {key: fits[key].cause.cost - log.gain(given, one)[0] for key, one in seen.items()}
+    gains = {key: log.gain(given, one) for key, one in seen.items()}
+    misfits |= {key: fits[key].cause.cost - less for key, (less, _) in gains.items()}
     order = sorted(seen, key=misfits.__getitem__)
     log.blind = min(log.blind, *(float(errors.mean()) for _, errors in (given, *seen.values())))
     whole, before, missed = log.beyond_noise(log.plain_errors), log.beyond_noise(given[1]), float(given[1].mean())
-    gain, error = -misfits[order[0]], log.gain(given, seen[order[0]])[1]
+    gain, sure, lucky = -misfits[order[0]], np.log(len(causes) / LEVEL), -ndtri(LEVEL / len(causes))
     left = {key: log.beyond_noise(errors) for key, (_, errors) in seen.items()}
-    ease = {key: 1.0 if fits[key].cause.trial else DISCRETE for key in order}
-    worth = {key: (min(before, whole) - x) / whole / ease[key] * fits[key].counts for key, x in left.items()}
-    decisive = DECISIVE * log.worth * ease[order[0]]
     result = Diagnosis(NONE, error=missed, noise=log.blind, held=log.held, ahead=log.step * log.ahead, misfits=misfits)
     result = replace(result, sentence=f"{result.how_far}, and no single cause explains that")
-    rival = max((-misfits[key] for key in fits if not fits[key].cause.is_like(fits[order[0]].cause)), default=np.inf)
-    by_chance = gain < min(-ndtri(LEVEL / len(causes)) * error, decisive, UNRIVALLED * max(rival, 1.0))
     plain = {key: log.plainness(fits[key]) for key in order}
+    share = {key: max(min(before, whole) - x, 0.0) / whole * fits[key].counts for key, x in left.items()}
+    proof = {key: plain[key] + share[key] * (-misfits[key] - plain[key]) for key in order}
     if missed < log.blur:
         return result, None
-    if by_chance and plain[order[0]] <= PLAIN:
-        return _judge_physics(log, causes, given, result, None)
     behind = {key: (misfits[key] + gain, log.gain(seen[key], seen[order[0]])[1]) for key in order}
     tied = [fits[key].cause for key, (less, error) in behind.items() if less < min(APART * error, ALIKE * gain)]
-    told = sorted((one for one in tied if plain[one.key] > PLAIN), key=lambda one: (one.cost, -plain[one.key]))
-    told = told or [one for one in tied if worth[one.key] > WORTH]
+    rare = {key for key, (less, error) in gains.items() if proof[key] > sure or less > lucky * error}
+    shown = [one for one in tied if one.key in rare and proof[one.key] > -WORTH * misfits[one.key]]
+    told = [one for one in shown if plain[one.key] > sure]
+    told = sorted(told, key=lambda one: (one.cost, -plain[one.key])) or shown
     if not told:
-        return _judge_physics(log, causes, given, result, fits[order[0]] if gain > decisive else None)
+        return _judge_physics(log, causes, given, result, fits[order[0]] if WORTH * gain > sure else None)
     cause, best, near = told[0], fits[told[0].key], list(dict.fromkeys(one.name for one in told))
     result = replace(result, share=1 - left[cause.key] / before, equals=tuple(near))
     if not all(map(cause.is_like, told)):
@@ -771,8 +765,9 @@ def _judge_physics(
     whole, before = log.beyond_noise(log.plain_errors), log.beyond_noise(given[1])
     for fit in (log.estimate(one) for one in causes if one.name == SEVERAL):
         errors = log.path_errors(fit.motion)
-        (gain, error), left = log.gain(given, (fit.left_out, errors)), log.beyond_noise(errors)
-        if gain > -ndtri(LEVEL / len(causes)) * error and before - left > WORTH * whole:
+        (gain, _), left = log.gain(given, (fit.left_out, errors)), log.beyond_noise(errors)
+        share = (before - left) / whole
+        if share > WORTH and share * gain > np.log(len(causes) / LEVEL):
             return _describe(replace(result, cause=SEVERAL, share=1 - left / before), fit), fit
     if before > POOR * log.held:
         words = f"{before / log.held:.2g} times the error of constant u, v, r"
