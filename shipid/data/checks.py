@@ -243,8 +243,3 @@ def _share_in_other_run(mine: _Motion, other: _Motion, shared: bool) -> float:
 def _share_of_same_motion(mine: _Motion, other: _Motion) -> float:
     """Share of the rows of a run that have the motion of a row of another run."""
     return float(np.mean(np.isin(mine.keys, other.keys))) if mine.lively else 0.0
-
-
-def root_mean_square(values: Array) -> float:
-    """Root mean square of values of any shape."""
-    return float(np.sqrt(np.mean(values**2)))

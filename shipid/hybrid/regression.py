@@ -207,9 +207,14 @@ class Regression(Method):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Learn every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
-        return {name: self._fit(task, name) for name in task.cases}
+        return {name: self.fit_one(task, name) for name in task.cases}
 
-    def _fit(self, task: Task, name: str) -> FitResult:
+    def fit_one(self, task: Task, name: str, *, left_out: bool = False) -> FitResult:
+        """Learn one foundation.
+
+        left_out : whether errors by laws without each fold are wanted, with the current and the ridge of all runs: one
+            run of two hardly tells them.
+        """
         begun, case, every = time.process_time(), task.cases[name], windows_of_folds(task)
         if not np.isfinite(case.paths[:, every]).all():
             points = [{"current": 0.0, "ridge": ridge} for ridge in self.ridge]
@@ -230,4 +235,13 @@ class Regression(Method):
         rows = [trial_row(i, point, float(missed[:, :, i].mean()), begun) for i, point in enumerate(points)]
         best = [int(row["number"]) for row in best_trials(rows)[:1]]
         whole = problem.corrector(last[best], currents[best], points[best[0]]) if best else None
-        return FitResult(whole, rows, time.process_time() - begun)
+        errors = None
+        if best and left_out:
+            fold = np.repeat(np.arange(len(folds)), [len(part) for _, part in folds])
+            every, future = np.concatenate([part for _, part in folds]), task.windows.future
+            others = problem.corrector(np.stack(weights)[fold, best[0]], currents[best * len(fold)], {})
+            errors = np.full_like(future, np.nan)
+            errors[:, every] = future[:, every] - others.predict(
+                case.physics, task.instants(name).select(every), np.empty(0)
+            )
+        return FitResult(whole, rows, time.process_time() - begun, errors)
