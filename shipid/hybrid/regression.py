@@ -229,8 +229,8 @@ class Regression(Method):
         *weights, last = problem.laws([*(training for training, _ in folds), every])
         judged = [part[np.linspace(0, len(part) - 1, JUDGED).round().astype(int)] for _, part in folds]
         chosen = np.concatenate([np.tile(part, len(points)) for part in judged])
-        left_out = problem.corrector(np.concatenate(weights), np.tile(currents, (len(folds), 1)), {})
-        paths = left_out.predict(case.physics, task.instants(name).select(chosen), np.empty(0))
+        without = problem.corrector(np.concatenate(weights), np.tile(currents, (len(folds), 1)), {})
+        paths = without.predict(case.physics, task.instants(name).select(chosen), np.empty(0))
         missed = np.square(paths - task.windows.future[:, chosen]).reshape(len(paths), len(folds), len(points), -1)
         rows = [trial_row(i, point, float(missed[:, :, i].mean()), begun) for i, point in enumerate(points)]
         best = [int(row["number"]) for row in best_trials(rows)[:1]]
@@ -239,9 +239,9 @@ class Regression(Method):
         if best and left_out:
             fold = np.repeat(np.arange(len(folds)), [len(part) for _, part in folds])
             every, future = np.concatenate([part for _, part in folds]), task.windows.future
-            others = problem.corrector(np.stack(weights)[fold, best[0]], currents[best * len(fold)], {})
+            laws = problem.corrector(np.stack(weights)[fold, best[0]], currents[best * len(fold)], {})
             errors = np.full_like(future, np.nan)
-            errors[:, every] = future[:, every] - others.predict(
+            errors[:, every] = future[:, every] - laws.predict(
                 case.physics, task.instants(name).select(every), np.empty(0)
             )
         return FitResult(whole, rows, time.process_time() - begun, errors)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,10 +87,12 @@ class Stack(Method):
                 fitted[name] = replace(one, corrector=stack)
                 continue
             known = one.left_out is not None
-            both = np.stack([one.left_out if known else law.left_out, law.left_out])
+            both = np.stack([law.left_out if one.left_out is None else one.left_out, law.left_out])
             weights, errors = weigh_errors(both, windows.run, by_left_out=known)
             chosen = {**stack.hyperparameters, "law": float(weights[1])}
-            stack = replace(stack, law=law.corrector, share=chosen["law"], hyperparameters=chosen)
+            stack = replace(
+                stack, law=cast(RegressionCorrector, law.corrector), share=chosen["law"], hyperparameters=chosen
+            )
             row = trial_row(0, chosen, float(np.nanmean(np.square(errors))), begun)
             fitted[name] = FitResult(stack, [row], one.seconds + seconds, errors if known else None)
         return fitted
