@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 import pymap3d
 
+from shipid.answer.sentences import best_model
 from shipid.logs.guess.draft import QUESTIONS
 from shipid.metrics import position_error
 from shipid.study.results import Results, read_results
@@ -286,21 +287,20 @@ def report_of_log(seed: int, folder: Path) -> tuple[str, list[Any], Results]:
     type_command(folder, "data", "import", "map.toml", name, "--out", "log.parquet")
     type_command(folder, "study", "new", "--vessel", "./craft.toml", "--data", "log.parquet", "--out", "study.toml")
     drafted = time.perf_counter()
-    less = ["--set", "grid.N_D=[2,8]", "--set", "prediction.interval=1.0"] if usv else []
-    type_command(folder, "study", "run", "study.toml", *less, "--workers", "1", "--out", "run")
+    type_command(folder, "study", "run", "study.toml", "--workers", "1", "--out", "run")
     minutes = [(drafted - begun) / 60, (time.perf_counter() - drafted) / 60]
     questions = (folder / "map.toml").read_text().count("# ? ") - len(QUESTIONS)
     return f"{craft.L:.1f} m, {DIALECTS[place]}", [questions, *minutes], read_results(folder / "run")
 
 
 def row_of_log(words: str, known: list[Any], results: Results) -> str:
-    """The row of a log in the table: H [m] with the most runs."""
+    """The row of a log in the table: H [m] with the most runs, of the physics that validation prefers."""
     cells = results.judged_cells
     largest = int(cells["N_D"].max())
-    last = cells[cells["N_D"] == largest].groupby("family", sort=False)["H"].mean()
+    last = cells[cells["N_D"] == largest].groupby("model", sort=False)["H"].mean()
     rivals = [results.regression[one.key] for one in results.plan.batches if largest == one.N_D]
     rival = float(np.mean([position_error(path, results.test.future).mean() for path in rivals]))
-    physics, none = float(last.drop("none").min()), float(last["none"])
+    physics, none = float(last[best_model(results)]), float(last["none"])
     lower = "yes" if physics < rival else "no"
     numbers = [f"{value:.3g}" for value in (physics, none, rival, float(results.naive.mean()))]
     minutes = f"{known[1]:.1f} + {known[2]:.1f}"

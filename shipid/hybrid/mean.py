@@ -1,7 +1,4 @@
-"""What a predictor holds: physics, a fitted method, limits and bands; and the mean of the paths of several such.
-
-Errors of foundations that differ cancel in part (Bates and Granger 1969, Breiman 1996: stacked regressions).
-"""
+"""What a predictor holds: physics, a fitted method, limits and bands; and the mean of the paths of several such."""
 
 from __future__ import annotations
 
@@ -9,10 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from shipid.data.windows import Commands, Instants
 from shipid.files import arrays_with_prefix
@@ -23,6 +16,7 @@ from shipid.hybrid.methods import METHODS
 from shipid.hybrid.novelty import NoveltyAlarm
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.simulated import physics_entry, physics_of_entry
+from shipid.hybrid.stack import sum_paths
 from shipid.vessel.load import Vessel
 
 
@@ -87,9 +81,6 @@ class DeployedMethod:
 def reason_of_no_band(provenance: Mapping[str, Any]) -> str:
     """Why a predictor of this provenance has no band."""
     return str(provenance.get("no_band", "it was made without"))
-
-
-SUM = 1e4  # weight, of the size of the errors, with which weights are held to the sum 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,41 +149,3 @@ def _part_header(part: DeployedMethod) -> dict[str, Any]:
         "method": part.method,
         "corrector": part.corrector.header(),
     }
-
-
-def sum_paths(paths: list[Array], weights: Array) -> Array:
-    """Weighted sum (T, S, 2) [m] of K paths."""
-    return np.asarray(np.tensordot(weights, np.stack(paths), 1))
-
-
-def weigh_errors(errors: Array, run: NDArray[np.str_], *, by_left_out: bool) -> tuple[Array, Array]:
-    """Weights (K,) of K foundations, and the errors (T, S, 2) [m] of their mean on runs left out.
-
-    errors : (K, T, S, 2) [m] on runs left out, not numbers where there are none. run : (S,) of each window.
-
-    With `by_left_out` weights are those, from 0 on and of sum 1, that leave the least squared error; errors on a run
-    are by the weights that the others give. Weights are equal of one run, and where no errors are known.
-    """
-    count, runs = len(errors), np.unique(run)
-    equal = np.full(count, 1 / count)
-    if not by_left_out or len(runs) < 2:
-        return equal, sum_paths([*errors], equal)
-    known = np.isfinite(errors).all(axis=(0, 1, 3))
-    each = [np.where(known, errors.swapaxes(2, 3), 0.0)[..., run == one].reshape(count, -1) for one in runs]
-    squares = np.stack([values @ values.T / max(values.shape[1], 1) for values in each])
-    left_out = np.full_like(errors[0], np.nan)
-    for one, own in zip(runs, squares, strict=True):
-        mine = run == one
-        left_out[:, mine] = sum_paths([*errors[:, :, mine]], _least_weights(squares.sum(axis=0) - own))
-    return _least_weights(squares.sum(axis=0)), left_out
-
-
-def _least_weights(squares: Array) -> Array:
-    """Weights (K,) from 0 on and of sum 1 with the least w' S w, S (K, K); equal where S says nothing."""
-    if not squares.any():
-        return np.full(len(squares), 1 / len(squares))
-    values, axes = np.linalg.eigh(squares)
-    size = float(np.sqrt(max(values.max(), 1e-300)))
-    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * axes.T / size
-    weights = nnls(np.concatenate([rows, np.full((1, len(rows)), SUM)]), np.append(np.zeros(len(rows)), SUM))[0]
-    return np.asarray(weights / weights.sum())

@@ -19,6 +19,7 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
 from shipid.hybrid.regression import Regression
+from shipid.hybrid.stack import Stack
 from shipid.plugins import Registry
 
 METHODS: Registry[type[Method]] = Registry("shipid.methods", fault_of_method)
@@ -34,6 +35,7 @@ METHODS |= {
     "path-trained": PathTrained,
     "recurrent": Recurrent,
     "regression": Regression,
+    "stack": Stack,
 }
 
 

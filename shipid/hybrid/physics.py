@@ -81,6 +81,11 @@ class Physics:
         return self.vessel is None
 
     @property
+    def absence(self) -> Physics:
+        """No physics, of the same steps."""
+        return replace(self, vessel=None, observer=None)
+
+    @property
     def ship(self) -> Vessel:
         """The vessel; ShipidError where there is none."""
         if self.vessel is None:

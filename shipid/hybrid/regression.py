@@ -207,9 +207,14 @@ class Regression(Method):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Learn every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
-        return {name: self._fit(task, name) for name in task.cases}
+        return {name: self.fit_one(task, name) for name in task.cases}
 
-    def _fit(self, task: Task, name: str) -> FitResult:
+    def fit_one(self, task: Task, name: str, *, left_out: bool = False) -> FitResult:
+        """Learn one foundation.
+
+        left_out : whether errors by laws without each fold are wanted, with the current and the ridge of all runs: one
+            run of two hardly tells them.
+        """
         begun, case, every = time.process_time(), task.cases[name], windows_of_folds(task)
         if not np.isfinite(case.paths[:, every]).all():
             points = [{"current": 0.0, "ridge": ridge} for ridge in self.ridge]
@@ -224,10 +229,19 @@ class Regression(Method):
         *weights, last = problem.laws([*(training for training, _ in folds), every])
         judged = [part[np.linspace(0, len(part) - 1, JUDGED).round().astype(int)] for _, part in folds]
         chosen = np.concatenate([np.tile(part, len(points)) for part in judged])
-        left_out = problem.corrector(np.concatenate(weights), np.tile(currents, (len(folds), 1)), {})
-        paths = left_out.predict(case.physics, task.instants(name).select(chosen), np.empty(0))
+        without = problem.corrector(np.concatenate(weights), np.tile(currents, (len(folds), 1)), {})
+        paths = without.predict(case.physics, task.instants(name).select(chosen), np.empty(0))
         missed = np.square(paths - task.windows.future[:, chosen]).reshape(len(paths), len(folds), len(points), -1)
         rows = [trial_row(i, point, float(missed[:, :, i].mean()), begun) for i, point in enumerate(points)]
         best = [int(row["number"]) for row in best_trials(rows)[:1]]
         whole = problem.corrector(last[best], currents[best], points[best[0]]) if best else None
-        return FitResult(whole, rows, time.process_time() - begun)
+        errors = None
+        if best and left_out:
+            fold = np.repeat(np.arange(len(folds)), [len(part) for _, part in folds])
+            every, future = np.concatenate([part for _, part in folds]), task.windows.future
+            laws = problem.corrector(np.stack(weights)[fold, best[0]], currents[best * len(fold)], {})
+            errors = np.full_like(future, np.nan)
+            errors[:, every] = future[:, every] - laws.predict(
+                case.physics, task.instants(name).select(every), np.empty(0)
+            )
+        return FitResult(whole, rows, time.process_time() - begun, errors)

@@ -97,6 +97,11 @@ class SimulatedPhysics(Physics):
         return self.simulator.gives
 
     @property
+    def absence(self) -> Physics:
+        """No physics, of the same steps."""
+        return Physics(None, self.horizon, self.step, self.integrator, path=self.path)
+
+    @property
     def ship(self) -> Vessel:
         """There is none: ShipidError."""
         raise ShipidError(f"{self.simulator.key} has no equations that could be changed or differentiated: {REMEDY}")

@@ -14,8 +14,9 @@ from shipid.data.windows import Instants, Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, shorten_line
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.mean import MeanCorrector, sum_paths, weigh_errors
+from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, fit_all
+from shipid.hybrid.stack import sum_paths, weigh_errors
 from shipid.metrics import (
     PREDICTION_ERRORS,
     coverage_share,

@@ -274,7 +274,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
         Choice("split.test", tests, _why_test(seen, tests)),
         Choice("prediction.ahead", float(f"{ahead:.9g}"), why),
         Choice("prediction.interval", interval, "s between instants of prediction"),
-        method,
+        _mean_with_law(method),
     ]
     steps = Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s")
     least = [Choice("grid.N_D", [LEAST_AMOUNT]), *([Choice("family", families[:1])] if families else [])]
@@ -493,6 +493,15 @@ def _proposed_method(passing: float, step: float, spare: float, of: str = "L/U")
         "out: they have no past"
     )
     return Choice("method", [{"name": "memory", "kind": "kernel", "memory": memory}], why)
+
+
+def _mean_with_law(method: Choice) -> Choice:
+    """A kernel in a mean with a regression: few runs of a log teach a law of accelerations more than a kernel."""
+    (block,) = method.value
+    settings = {key: value for key, value in block.items() if key not in ("name", "kind")}
+    stack = {"name": block["name"], "kind": "stack", **({"kernel": settings} if settings else {})}
+    law = "a kernel on paths beside a regression on accelerations: runs left out say how much each counts"
+    return Choice(method.path, [stack], f"{law}; {method.why}")
 
 
 def _past_of_method(method: Choice) -> float:

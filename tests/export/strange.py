@@ -22,6 +22,7 @@ from shipid.hybrid.one_step import OneStepCorrector, OutputWeights
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
 from shipid.hybrid.regression import RegressionCorrector, law_terms
+from shipid.hybrid.stack import StackCompensator
 from shipid.hybrid.stepping import MISSED_NAMES
 from shipid.hybrid.units import Units
 from shipid.observer import ESTIMATE_COLUMNS, Observer
@@ -32,7 +33,7 @@ from tests.conftest import ENVELOPE, SPEEDS, pace, variety
 
 KINDS = (
     *("alone", "calibrator", "forest", "hankel-dmd", "learned-force", "modules"),
-    *("one-step", "path-trained", "recurrent", "kernel", "regression"),
+    *("one-step", "path-trained", "recurrent", "kernel", "regression", "stack"),
 )
 STEPPED = ("hankel-dmd", "modules", "one-step", "regression")  # corrected by step: they refuse an observer
 NEEDS_PHYSICS = ("alone", "calibrator", "learned-force", "modules")
@@ -258,13 +259,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         law = LinearLaw(inputs.commands, delays, normaliser, weights)
         return HankelCorrector(law, delays * physics.step, {})
     if kind == "regression":
-        table = feature_table(instants.columns, inputs.commands)
-        names = tuple(name for name in table if not name.endswith("_rw") or name in wind)
-        terms = np.stack(law_terms(table, names))
-        weights = rng.normal(0, 0.01 * slow, (1, len(terms), 3)) / np.abs(terms).max(axis=1)[:, None]
-        reach = slow * rng.uniform([3.0, 1.0, 0.1], [9.0, 3.0, 0.5])
-        current = slow * rng.normal(0, 0.3, (1, 2))
-        return RegressionCorrector(inputs.commands, names, weights, current, -reach, reach, {})
+        return _law(rng, inputs, instants, wind, slow)
     if kind == "calibrator":
         inputs = TrajectoryInputs(inputs.commands, inputs.memory, int(rng.integers(1, 4)))
     planned = instants if rng.random() < 0.5 else seen
@@ -278,7 +273,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
             fewer = [name for name in taken if rng.random() < 0.8] or taken
             networks.append(network_of(rng, fewer, table, horizon, terms, rng.random() < 0.5))
         return Compensator(inputs, tuple(networks), {})
-    if kind in ("kernel", "calibrator"):
+    if kind in ("kernel", "calibrator", "stack"):
         normaliser, count = _normaliser(taken, table), int(rng.integers(1, 40))
         centres = normaliser.apply(table)[rng.integers(size, size=count)]
         members = tuple(
@@ -289,6 +284,9 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         )
         reflection = _signs(rng, len(taken)) if rng.random() < 0.6 else None
         made, basis = TrajectoryCompensator if kind == "calibrator" else KernelCompensator, smooth_basis(horizon, terms)
+        if kind == "stack":
+            law, share = _law(rng, inputs, instants, wind, slow), float(rng.uniform())
+            return StackCompensator(inputs, normaliser, reflection, basis, centres, members, {}, law, share)
         return made(inputs, normaliser, reflection, basis, centres, members, {})
     if kind == "forest":
         values = np.stack([table[name] for name in taken], axis=1)
@@ -309,6 +307,16 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         networks.append(GatedNetwork(reader, layers, smooth_basis(horizon, terms)))
     past = max(steps * physics.step, inputs.memory.past)
     return RecurrentCorrector(inputs, past, tuple(networks), {})
+
+
+def _law(rng, inputs, instants, wind, slow):
+    table = feature_table(instants.columns, inputs.commands)
+    names = tuple(name for name in table if not name.endswith("_rw") or name in wind)
+    terms = np.stack(law_terms(table, names))
+    weights = rng.normal(0, 0.01 * slow, (1, len(terms), 3)) / np.abs(terms).max(axis=1)[:, None]
+    reach = slow * rng.uniform([3.0, 1.0, 0.1], [9.0, 3.0, 0.5])
+    current = slow * rng.normal(0, 0.3, (1, 2))
+    return RegressionCorrector(inputs.commands, names, weights, current, -reach, reach, {})
 
 
 def replace_planned(instants):

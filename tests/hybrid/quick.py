@@ -21,6 +21,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "one-step": {"trials": 2, "units": 16, "averaged": 2},
     "path-trained": {"trials": 2, "epochs": 20, "units": 8, "layers": 1, "input_dropout": 0.0, "hidden_dropout": 0.0},
     "recurrent": {"trials": 2, "epochs": 3, "units": 6, "seconds": 4.0},
+    "stack": {"kernel": {"trials": 2, "steps": 4, "search_windows": 40, "centres": 60}},
 }
 DOCUMENTED = "linear"  # the method of docs/extending.md
 

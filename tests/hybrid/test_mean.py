@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.hybrid.mean import DeployedMethod, MeanCorrector, weigh_errors
+from shipid.hybrid.mean import DeployedMethod, MeanCorrector
 from shipid.hybrid.method import fit_all
+from shipid.hybrid.stack import weigh_errors
 from shipid.predictor import Predictor
 from tests.drawn import seeds
 from tests.hybrid.quick import quick, small_world

@@ -112,6 +112,19 @@ def test_a_steady_current_is_found(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", seeds(3, 30))
+def test_errors_left_out_are_by_laws_of_the_other_runs(seed: int) -> None:
+    random = np.random.default_rng([seed, 12])
+    train, _ = split(log_of(drawn_law(random), np.zeros(2), random, noise=0.2))
+    task, method = task_of(train), Regression(ridge=(1e-3,))
+    fit = method.fit_one(task, "none", left_out=True)
+    problem, physics = RegressionProblem(method, task, "none"), task.cases["none"].physics
+    for training, judged in task.folds:
+        law = replace(fit.corrector, weights=problem.laws([training])[0, [fit.corrector.current.any() * 1]])
+        paths = law.predict(physics, task.instants("none").select(judged), np.empty(0))
+        np.testing.assert_allclose(train.future[:, judged] - paths, fit.left_out[:, judged], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", seeds(3, 30))
 def test_it_is_plain_least_squares(seed: int) -> None:
     """Written here once more, without currents, mirrors and means."""
     random = np.random.default_rng([seed, 6])

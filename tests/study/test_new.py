@@ -123,7 +123,7 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
     prepared = prepare(plan, obtain_runs(plan))
     assert len(prepared.pool.spans) == plan.study.grid.N_D[-1] == 7
     assert len(prepared.folds(plan.batches[0], prepared.pool, "runs")) == 7  # every run is left out in its turn
-    assert [way.kind for way in plan.methods] == ["kernel"]
+    assert [way.kind for way in plan.methods] == ["stack"]
     assert document["split"]["test"] == ["zz 3"] or document["split"]["test"] == ["zz 4"]
     assert document["prediction"]["ahead"] == 19  # 2.5 x 33.9 m / 4.35 m/s
     assert "zigzag 8" in document["description"]
@@ -188,7 +188,7 @@ def test_the_test_run_holds_the_past_of_the_method(tmp_path: Path) -> None:
     begin = frame.groupby("run")["t"].transform("min")
     kept = frame[frame["t"] - begin <= frame["run"].map(ends)].reset_index(drop=True)
     _, document = drafted(tmp_path, Dataset(kept, dataset.metadata))
-    assert "memory" in document["method"][0]
+    assert "memory" in document["method"][0]["kernel"]
     assert all(ends[name] == 150.0 for name in document["split"]["test"])
 
 
@@ -423,7 +423,7 @@ def test_a_log_without_commands_is_studied_without_physics(tmp_path: Path, monke
     written = CliRunner().invoke(app, ["study", "new", "--data", "ais.parquet"])
     assert written.exit_code == 0, written.output
     assert "30 rows of the log: no vessel gives a length" in " ".join(written.output.split())
-    plan = read_plan("ais-study.toml", {"grid.N_D": [2], "method.0.trials": 4})
+    plan = read_plan("ais-study.toml", {"grid.N_D": [2], "method.0.kernel.trials": 4})
     assert [one.name for one in plan.foundations] == ["none"]
     folder = tmp_path / "results"
     for _ in run_study(plan, folder, workers=1):
