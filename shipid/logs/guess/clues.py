@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,7 @@ def unknown_unit(name: str) -> str:
     return ""
 
 
+@cache
 def unit_of_another(name: str, meaning: str) -> str | None:
     """The unit set off in a name where a column of this meaning cannot have it; None if it can, or none is there."""
     si = si_unit(meaning)

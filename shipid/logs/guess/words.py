@@ -313,6 +313,7 @@ def _plain_name(name: str) -> str:
     return _SPELT.sub(in_brackets, name.translate(WIDE))
 
 
+@cache
 def name_parts(name: str) -> tuple[str, ...]:
     """The parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
     name = _plain_name(name)
@@ -380,6 +381,7 @@ def factor_in_name(name: str) -> float:
     return next((factor for si in ("rad", "rad/s", "rev/s") if (factor := _unit_and_factor(name, si)[1]) != 1.0), 1.0)
 
 
+@cache
 def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
     inside = units_in_name(name)
     bare = re.sub(r"[\[(].*", "", name).strip()
