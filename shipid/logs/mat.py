@@ -145,7 +145,10 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str]]:
         elif _is_sparse(value):
             yield name, f"a sparse matrix{NO_VECTOR}"
         elif array.dtype == object and array.size and isinstance(array.flat[0], dict):
-            yield from ((one, f"in an array of structs{NO_VECTOR}") for one in (name, *_keys_of(name, array.flat[0])))
+            yield from (
+                (one, f"in an array of structs{NO_VECTOR}")
+                for one in (name, *(f"{name}.{key}" for key in array.flat[0]))
+            )
         elif array.dtype.kind in "OUc" or array.ndim > 2:
             what = {"O": "an array of cells", "U": "text", "c": "complex"}.get(array.dtype.kind)
             yield name, f"{what or f'an array of {array.ndim} axes'}{NO_VECTOR}"
@@ -155,10 +158,6 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str]]:
             yield name, f"a matrix with a row for each signal{NO_VECTOR}"
         elif array.ndim == 2:
             yield name, f"a matrix: its columns are {name}.1 to {name}.{array.shape[1]}"
-
-
-def _keys_of(name: str, struct: dict[str, Any]) -> Iterable[str]:
-    return (f"{name}.{key}" for key in struct)
 
 
 def is_mat(_: Path, head: bytes) -> dict[str, Any] | None:

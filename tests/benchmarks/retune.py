@@ -11,6 +11,7 @@ import argparse
 import pickle
 import tempfile
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import ModuleType
@@ -37,22 +38,30 @@ KEPT: dict[ModuleType, tuple[str, ...]] = {
 class Racer:
     """Settings that differ by `change` from those in use, and their logs so far.
 
-    silent : silent and wrong. faulty : not right. other : verdicts that the settings in use do not have. out_at : log
-    at which it is out; 0 where it is not.
+    seen : all. silent : silent and wrong. faulty : not right. other : verdicts that the settings in use do not have.
     """
 
     change: Mapping[str, float]
+    seen: int = 0
     silent: int = 0
     faulty: int = 0
     other: int = 0
-    out_at: int = 0
+    out: bool = False
+
+    @property
+    def wrong(self) -> tuple[int, int]:
+        """Logs that are silent and wrong, and that are not right."""
+        return self.silent, self.faulty
 
     def judge(self, log: drawn_logs.Drawn) -> drawn_logs.Verdict:
         """Judge a log, and count it."""
         usual = {name: getattr(SETTINGS, name) for name in self.change}
-        _set_numbers(self.change)
-        verdict = drawn_logs.judge(log)
-        _set_numbers(usual)
+        try:
+            _set_numbers(self.change)
+            verdict = drawn_logs.judge(log)
+        finally:
+            _set_numbers(usual)
+        self.seen += 1
         self.silent += verdict.word == "silent"
         self.faulty += verdict.word != "right"
         return verdict
@@ -82,23 +91,22 @@ def keep_results(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def race(racers: list[Racer], seeds: range) -> Racer:
-    """Judge drawn logs with the settings in use, which are returned, and with every change that is not out."""
+    """Judge drawn logs with the settings in use, which are returned, and with every change that is not out.
+
+    Ctrl-C ends it with the logs so far.
+    """
     base = Racer({})
     kept = [(module, name, getattr(module, name)) for module, names in KEPT.items() for name in names]
-    for count, seed in enumerate(seeds, start=1):
-        patches = [patch.object(module, name, keep_results(function)) for module, name, function in kept]
-        with tempfile.TemporaryDirectory() as folder:
-            log = drawn_logs.draw(seed, Path(folder) / "logs")
-            for one in patches:
-                one.start()
-            verdict = base.judge(log)
-            for racer in (racer for racer in racers if not racer.out_at):
-                racer.other += racer.judge(log) != verdict
-                racer.out_at = count * (racer.silent > base.silent or racer.faulty > base.faulty)
-                if racer.out_at:
-                    print(f"out: {racer}", flush=True)
-            for one in patches:
-                one.stop()
+    with suppress(KeyboardInterrupt):
+        for seed in seeds:
+            with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+                log = drawn_logs.draw(seed, Path(folder) / "logs")
+                for module, name, function in kept:
+                    stack.enter_context(patch.object(module, name, keep_results(function)))
+                verdict = base.judge(log)
+                for racer in (racer for racer in racers if not racer.out):
+                    racer.other += racer.judge(log) != verdict
+                    racer.out = racer.silent > base.silent or racer.faulty > base.faulty
     return base
 
 
@@ -112,17 +120,14 @@ def main() -> None:
     racers = [Racer({name: changed_value(value, factor)}) for name, value in usual.items() for factor in FACTORS]
     seeds = range(asked.seed, asked.seed + asked.logs)
     base = race(racers, seeds)
-    print(f"as they are: {base.silent} silent, {base.faulty} not right of {asked.logs}")
-    for racer in racers:
-        end = f"out at log {racer.out_at}" if racer.out_at else "not out"
-        print(f"{racer.change}: {racer.silent} silent, {racer.faulty} not right, {racer.other} others; {end}")
-    better = [one for one in racers if not one.out_at and (one.silent, one.faulty) != (base.silent, base.faulty)]
-    better.sort(key=lambda one: (one.silent, one.faulty), reverse=True)  # of two of one number the better is last
+    print(base)
+    print(*racers, sep="\n")
+    better = [one for one in racers if one.seen == base.seen and one.wrong < base.wrong and not one.out]
+    better.sort(key=lambda one: one.wrong, reverse=True)  # of two of one number the better is last
     proposed = Racer({name: value for one in better for name, value in one.change.items()})
-    print(f"proposed: {dict(proposed.change)}")
+    print("proposed:", dict(proposed.change))
     if better:
-        again = race([proposed], range(seeds.stop, seeds.stop + asked.logs))
-        print(f"fresh logs: {again.silent} silent, {again.faulty} not right; as proposed {proposed}")
+        print("on fresh logs:", race([proposed], range(seeds.stop, seeds.stop + asked.logs)), proposed)
 
 
 if __name__ == "__main__":

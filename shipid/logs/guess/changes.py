@@ -129,7 +129,8 @@ def _other_senses(state: State, parts: list[Windows], edges: list[int]) -> Itera
         for number, (part, ends) in enumerate(zip(parts, pairwise(edges), strict=True)):
             rows = slice(*ends)
             if part.sum() >= FEWEST and np.median(speed[part]) >= fast:
-                effect = evidence.order_effect(state.t[rows], r[rows], state.columns[one.source][rows], state.part)
+                order = state.columns[one.source][None, rows]
+                effect = float(evidence.order_effects(state.t[rows], r[rows], order, state.part)[0])
                 senses |= {number: float(np.sign(effect))} if abs(effect) > 2.0 * SETTINGS.seen else {}
         usual = sum(senses.values()) + 0.5 * state.turning.get(one.source, next(iter(senses.values()), 0.0))
         odd = [number for number, sense in senses.items() if sense * usual < 0.0]
