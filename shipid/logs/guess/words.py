@@ -560,7 +560,7 @@ def _scores_of_name(name: str) -> dict[str, float]:
 
 
 def _phrase_share(
-    phrase: frozenset[str], beside: set[str], parts: list[str], content: list[str], aside: set[str]
+    phrase: frozenset[str], beside: set[str], parts: list[str], content: list[str], aside: frozenset[str]
 ) -> float:
     """The share of the letters of a name that a phrase and words beside it explain; 0 if it lacks a word."""
     if not phrase <= {*parts}:
