@@ -12,14 +12,12 @@ import numpy as np
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import Array, choose_features, input_group, select_inputs
 from shipid.hybrid.stored import StoredData
-from shipid.logs.guess.words import words_of_side
+from shipid.logs.guess.words import SIDE_WORDS
 from shipid.physics.signals import is_command, is_steering, is_thrust_order, mirror_sign
 
 OTHER_SIDE = {"port": "starboard", "starboard": "port"}
-SIDES = {
-    word: side for side in OTHER_SIDE for word in words_of_side(side)
-}  # words in names of components: p, stbd, left
-ENDS = frozenset().union(*map(words_of_side, ("bow", "stern", "fore", "aft")))  # units there stand on the middle line
+SIDES = {word: side for side in OTHER_SIDE for word in SIDE_WORDS[side]}  # in names of components: p, stbd, left
+ENDS = frozenset().union(*map(SIDE_WORDS.__getitem__, ("bow", "stern", "fore", "aft")))  # on the middle line
 ACROSS = re.compile(
     "bow|tunnel|lateral|transvers|strahl|(stern|aft|fore).*thruster|thruster.*(stern|aft|fore)"
 )  # in names of units whose shaft may drive sideways, such as `bowthruster`

@@ -634,6 +634,11 @@ def judge(drawn: Drawn) -> Verdict:
         guessed = guess(drawn.path)
     except ShipidError as error:
         return Verdict("right" if drawn.impossible else "reported", (f"refused: {error.message}",))
+    return judge_guess(drawn, guessed)
+
+
+def judge_guess(drawn: Drawn, guessed: Guess) -> Verdict:
+    """Import as drafted, and compare."""
     file = drawn.path.parent / f"{drawn.path.stem}-draft.toml"
     file.write_text(draft_text(guessed), encoding="utf-8")
     try:

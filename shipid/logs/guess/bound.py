@@ -9,7 +9,7 @@ import numpy as np
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.commands import PULSES
-from shipid.logs.guess.words import name_parts, number_in_name, side_in_name, words_of_side
+from shipid.logs.guess.words import SIDE_WORDS, name_parts, number_in_name, side_in_name
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls
@@ -202,7 +202,7 @@ def _rename_output(one: Suggestion, components: dict[str, str]) -> Suggestion:
 
 def _place_in_name(name: str) -> str:
     component = name.partition(".")[0]
-    place = next((one for one in PLACES if component.lower() in words_of_side(one)), None) or side_in_name(component)
+    place = next((one for one in PLACES if component.lower() in SIDE_WORDS[one]), None) or side_in_name(component)
     return place if place in PLACES else ""
 
 

@@ -69,9 +69,10 @@ def _other_scales(state: State, parts: list[Windows]) -> Iterator[Change]:
 def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[int], float]:
     """The parts of the windows (W,) in which seen = scale * ran has another scale than in most; its ratio to theirs."""
     fits = [evidence.fit_without_outliers(seen[one], ran[one]) if one.sum() >= FEWEST else None for one in parts]
-    scales = {number: fit.scale for number, fit in enumerate(fits) if fit and fit.left < SETTINGS.two_left}
+    scales = {number: fit.scale for number, fit in enumerate(fits) if fit and fit.left < SETTINGS.named_left}
     usual = sorted(scales.values())[len(scales) // 2] if scales else 0.0
-    odd = [one for one, scale in scales.items() if not 1 / SETTINGS.alike < scale / usual < SETTINGS.alike]
+    alike = float(np.exp(SETTINGS.alike_left))
+    odd = [one for one, scale in scales.items() if not 1 / alike < scale / usual < alike]
     if not odd:
         return [], 1.0
     both = [np.any([parts[one] for one in of], axis=0) for of in (odd, scales.keys() - {*odd})]  # no part that is mixed
@@ -79,7 +80,7 @@ def odd_scales(seen: Complex, ran: Complex, parts: list[Windows]) -> tuple[list[
     motion = [float(np.sum(np.abs(seen[rows]) ** 2)) for rows in both]
     one_left = evidence.fit_scale(seen[both[0] | both[1]], ran[both[0] | both[1]]).left
     left = sum(fit.left * size for fit, size in zip(two, motion, strict=True)) / sum(motion)
-    clear = one_left > SCALED and left < SETTINGS.two_left * one_left
+    clear = one_left > SCALED and left < SETTINGS.named_left * one_left
     return (odd, two[0].scale / two[1].scale) if clear else ([], 1.0)
 
 
@@ -129,7 +130,8 @@ def _other_senses(state: State, parts: list[Windows], edges: list[int]) -> Itera
         for number, (part, ends) in enumerate(zip(parts, pairwise(edges), strict=True)):
             rows = slice(*ends)
             if part.sum() >= FEWEST and np.median(speed[part]) >= fast:
-                effect = evidence.order_effect(state.t[rows], r[rows], state.columns[one.source][rows], state.part)
+                order = state.columns[one.source][None, rows]
+                effect = float(evidence.order_effects(state.t[rows], r[rows], order, state.part)[0])
                 senses |= {number: float(np.sign(effect))} if abs(effect) > 2.0 * SETTINGS.seen else {}
         usual = sum(senses.values()) + 0.5 * state.turning.get(one.source, next(iter(senses.values()), 0.0))
         odd = [number for number, sense in senses.items() if sense * usual < 0.0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.amounts import UNIT_WORDS, is_known, north_reference, without_prefix
-from shipid.logs.guess.evidence import Complex, RowWindows, order_effect
+from shipid.logs.guess.evidence import Complex, RowWindows, order_effects
 from shipid.logs.guess.words import (
     how_much_says,
     is_note,
@@ -92,6 +93,7 @@ def unknown_unit(name: str) -> str:
     return ""
 
 
+@cache
 def unit_of_another(name: str, meaning: str) -> str | None:
     """The unit set off in a name where a column of this meaning cannot have it; None if it can, or none is there."""
     si = si_unit(meaning)
@@ -174,7 +176,7 @@ class State:
 
     def effect(self, r: Array, order: Array) -> float:
         """The t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
-        return order_effect(self.t, r, order, self.part)
+        return float(order_effects(self.t, r, order[None], self.part)[0])
 
     @property
     def part(self) -> float:

@@ -119,16 +119,11 @@ def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.
     return np.interp(index, index[known], np.unwrap(values[known], period=turn)), false
 
 
-def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
-    """The t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
+def order_effects(t: Array, r: Array, orders: Array, duration: float) -> Array:
+    """The t values (K,) of a in r' = a orders + b r + c: > 0 if an order turns to starboard, 0 where none is seen.
 
-    t, r, order : (N,), r [rad/s]. duration : of the windows [s].
+    t, r : (N,), r [rad/s]. orders : (K, N). duration : of the windows [s].
     """
-    return float(order_effects(t, r, order[None], duration)[0])
-
-
-def order_effects(t: Array, r: Array, orders: Array, duration: float = 4.0) -> Array:
-    """The t values (K,) of the effects of several orders (K, N) at once, as of `order_effect`; 0 where none is seen."""
     design, change = _yaw_regression(t, r, orders, duration)
     sizes, none = np.linalg.norm(design, axis=0), np.zeros(len(orders))
     if len(change) < 12 or np.any(np.ptp(orders, axis=1) == 0.0) or not np.all(sizes > 0.0):

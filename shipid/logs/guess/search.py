@@ -281,7 +281,7 @@ def _rank_poses(state: State, places: list[Place], headings: list[str]) -> list[
                     if one[0] < 1.0 and one[1] not in dict(ranked).values()
                 ]
             for misfit, sense in ranked if alike else ranked[:1]:
-                across = SETTINGS.quarter * (sense.sign > 0 and sense.quarter != 0)
+                across = SETTINGS.left * (sense.sign > 0 and sense.quarter != 0)
                 share = (misfit + SETTINGS.floor + across) / (spread + SETTINGS.spread)
                 poses.append(Pose(place, name, turn, sense, misfit, place.cost + cost + float(np.log(share))))
     return sorted(poses, key=lambda one: one.cost)

@@ -14,36 +14,33 @@ class SearchSettings:
 
     floor : share of a motion that no model explains, of antennas and sensors that are not in one place.
     poor : 1 - agreement of course and heading from which a person is asked whether they are position and heading.
-    spread : the same of a heading that hardly turns, so that a straight course decides nothing.
+    spread : 1 - mean cosine of a heading that hardly turns, so that a straight course decides nothing.
     unnamed : weight of a name that says nothing, beside 1 of one that says the meaning.
-    quarter : added to the misfit of a heading across the track: an acceleration looks like that.
     usual_unit : cost of a unit that logs usually have where no name says one.
     close : cost by which the best of two must lead, or both are asked.
     beam : poses that are tried with velocities and rates.
-    alike_left : logarithm of the ratio of two shares from which one is better.
+    alike_left : logarithm of the ratio of two shares, or of two scales, from which they are not one.
     left, named_left : share of a motion that a column may leave, without and with a fitting name; with half of it left
-        the track says nothing of the heading: the ship is moored, or drifts to any side.
+        the track says nothing of the heading: the ship is moored, or drifts to any side. Two scales leave at most half
+        of what one leaves. The first is added to the misfit of a heading across the track: an acceleration looks so.
     off_unit : relative error of a factor from a unit, one standard deviation; a sensor is rarely off by more.
     outward : share of ships whose sway counts against the yaw rate in turns: those steered aft of midships.
     odd : cost of a name that says another axis, of no velocity or rate where columns may be one, of a unit that few
         logs have, of a clock in another unit than the one drafted.
     rare : cost of an axis that counts the other way, of a compass that is none, of a unit that is not written; a shaft
         at that cost, 14 times off a usual way in a turn, has another unit.
-    settling : cost of axes against which a course or velocities to north and east speak.
+    settling : cost of axes against which a course or velocities to north and east speak: more than `rare`.
     seen : t value of an effect on the motion from which it is taken for one.
     astern : share of the turning shaft's rows in which it turns astern, of a screw whose sign is the other way.
     turned : range of a heading that no name says [rad], at least.
-    advance : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05).
-    alike : ratio of two scales that are one.
-    two_left : share of what one scale leaves that two leave, at most.
     steady : share of the mean wind speed by which a wind may change while the ship turns.
+    advance : way of a ship in one turn of its shaft over the radius of a usual turn (0.002 to 0.05).
     """
 
     floor: float = 0.003
     poor: float = 0.2
     spread: float = 0.01
     unnamed: float = 0.25
-    quarter: float = 0.1
     usual_unit: float = 0.5
     close: float = 1.5
     beam: int = 12
@@ -58,10 +55,8 @@ class SearchSettings:
     seen: float = 4.0
     astern: float = 0.9
     turned: float = 0.14
-    advance: float = 0.01
-    alike: float = 1.4
-    two_left: float = 0.3
     steady: float = 0.25
+    advance: float = 0.01
 
 
 SETTINGS = SearchSettings()

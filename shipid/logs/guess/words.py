@@ -85,6 +85,7 @@ CONCEPTS = {
     "deg": "degrees",
 }
 """Concept -> words for it in ten languages."""
+_CONCEPT_OF_WORD = {word: concept for concept, words in CONCEPTS.items() for word in words.split()}
 PHRASES: dict[str, str] = {
     "latitude": "lat, latitude, phi gps",
     "longitude": "long, longitude, lambda, lambda gps",
@@ -157,6 +158,10 @@ OTHERS = (
     "generator rpm"
 )
 """Phrases of columns that no dataset takes."""
+_MEANING_PHRASES = {
+    meaning: tuple(frozenset(phrase.split()) for phrase in text.split(","))
+    for meaning, text in {**PHRASES, "": OTHERS}.items()
+}
 ORDERS = frozenset(
     (
         "befehl c cmd command commanded d demand des desired goal oensket onsket ord order ordered ordre ref "
@@ -188,17 +193,19 @@ UNIT_PARTS = frozenset(
     ).split()
 )
 """Parts that are a unit at the end of a name."""
-SIDE_WORDS = {
-    "port": "port|ps|bb|bab|br|babord|backbord|p|prt|portside|left|babor|bakboord|bagbord|sinistra|sx|links|gauche|"
-    "bd|bombordo",
-    "starboard": "starboard|stbd|sb|tri|er|stb|styrbord|steuerbord|s|strbd|right|star|tribord|trib|td|tb|estribor|"
-    "dritta|dx|stuurboord|rechts|droite|be|estibordo",
+_SIDES = {
+    "port": "port ps bb bab br babord backbord p prt portside left babor bakboord bagbord sinistra sx links gauche "
+    "bd bombordo",
+    "starboard": "starboard stbd sb tri er stb styrbord steuerbord s strbd right star tribord trib td tb estribor "
+    "dritta dx stuurboord rechts droite be estibordo",
     "stern": "stern",
     "bow": "bow",
-    "fore": "fore|fwd",
+    "fore": "fore fwd",
     "aft": "aft",
     "main": "main",
 }
+SIDE_WORDS = {side: frozenset(words.split()) for side, words in _SIDES.items()}
+"""Side or place of a component -> words for it."""
 MAGNETIC = frozenset(["magnetic", "compass"])
 """Parts that say that a heading is that of a magnetic compass."""
 NOT_MAGNETIC = frozenset("gyro sat satellite gps gnss rtk fog".split())
@@ -313,6 +320,7 @@ def _plain_name(name: str) -> str:
     return _SPELT.sub(in_brackets, name.translate(WIDE))
 
 
+@cache
 def name_parts(name: str) -> tuple[str, ...]:
     """The parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
     name = _plain_name(name)
@@ -329,12 +337,7 @@ def name_parts(name: str) -> tuple[str, ...]:
         for word in whole
         for part in ([word] if word.lower() in _known_words() | UNIT_PARTS else _EDGE.split(word.replace("StB", "Stb")))
     ]
-    return tuple(_concept_of_word().get(part, part) for word in words for part in _split_word(word))
-
-
-@cache
-def _concept_of_word() -> dict[str, str]:
-    return {word: concept for concept, words in CONCEPTS.items() for word in words.split()}
+    return tuple(_CONCEPT_OF_WORD.get(part, part) for word in words for part in _split_word(word))
 
 
 @cache
@@ -380,6 +383,7 @@ def factor_in_name(name: str) -> float:
     return next((factor for si in ("rad", "rad/s", "rev/s") if (factor := _unit_and_factor(name, si)[1]) != 1.0), 1.0)
 
 
+@cache
 def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
     inside = units_in_name(name)
     bare = re.sub(r"[\[(].*", "", name).strip()
@@ -450,18 +454,9 @@ def _split_word(word: str) -> tuple[str, ...]:
 ENGINES = frozenset("engine engines motor motors moteur moteurs motore motori me maskin".split())
 
 
-@cache
-def _meaning_phrases() -> dict[str, tuple[frozenset[str], ...]]:
-    return {
-        meaning: tuple(frozenset(phrase.split()) for phrase in text.split(","))
-        for meaning, text in {**PHRASES, "": OTHERS}.items()
-    }
-
-
 def is_electrical(name: str) -> bool:
     """Whether a name says the electrical speed of a motor: that of its shaft times its pairs of poles."""
-    parts = name_parts(name)
-    joined = "_".join(parts)
+    joined = "_".join(name_parts(name))
     return bool(re.search(r"(^|_)(erpm|e_rpm|elec(tr(ic(al)?)?)?_rpm|eldrehzahl)(_|$)", joined))
 
 
@@ -501,15 +496,9 @@ def side_in_name(name: str) -> str | None:
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", _plain_name(name)))  # 1/s is no starboard
     parts = set(name_parts(name)) | set(re.split(r"[\W\d_]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
-        if len(parts - {""}) > 1 and set(words.split("|")) & parts:
+        if len(parts - {""}) > 1 and words & parts:
             return side
     return None
-
-
-@cache
-def words_of_side(side: str) -> frozenset[str]:
-    """The words that say a side, such as `port`."""
-    return frozenset(SIDE_WORDS[side].split("|"))
 
 
 def how_much_says(name: str, command: str) -> int:
@@ -547,13 +536,12 @@ def _scores_of_name(name: str) -> dict[str, float]:
     parts = list(name_parts(name))
     said = {what for si, what in QUANTITIES.items() if unit_in_name(name, si) is not None} - {*parts}
     order = is_order(name)
-    sides = {word for words in SIDE_WORDS.values() for word in words.split("|")}
-    aside = sides | SOURCES | (ORDERS if order else set())
+    aside = SOURCES.union(*SIDE_WORDS.values(), ORDERS if order else ())
     while len(parts) > 1 and parts[-1] in UNIT_PARTS:
         parts.pop()
     content = [part for part in parts if part not in aside and not part.isdigit()]
     meanings: dict[str, float] = {}
-    for meaning, phrases in _meaning_phrases().items():
+    for meaning, phrases in _MEANING_PHRASES.items():
         beside = {*BESIDE.get(meaning, "").split()} & {*parts}
         best = max(
             _phrase_share(phrase, beside, [*parts, *said], content, aside) for phrase in phrases if phrase - said
@@ -577,7 +565,7 @@ def _scores_of_name(name: str) -> dict[str, float]:
 
 
 def _phrase_share(
-    phrase: frozenset[str], beside: set[str], parts: list[str], content: list[str], aside: set[str]
+    phrase: frozenset[str], beside: set[str], parts: list[str], content: list[str], aside: frozenset[str]
 ) -> float:
     """The share of the letters of a name that a phrase and words beside it explain; 0 if it lacks a word."""
     if not phrase <= {*parts}:
