@@ -159,26 +159,6 @@ def study_run(
     _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, part)
 
 
-@app.command("ships")
-def study_ships(
-    out: Annotated[Path, typer.Option(help="folder of the cells; a second start goes on there")] = Path(
-        "results/ships"
-    ),
-    seed: Annotated[int, typer.Option(min=0, help="of the drawn ships and their runs")] = 0,
-    drawn: Annotated[int, typer.Option(min=10, help="number of drawn ships")] = 30,
-    workers: Workers = None,
-    shard: Annotated[str | None, typer.Option(help="i/n: every n-th ship from the i-th on")] = None,
-) -> None:
-    """Study every bundled ship and drawn ones: the error over physics, runs and horizon, a table for the law."""
-    from shipid.capacity import usable_cores
-    from shipid.exchange.campaign import run_ships
-
-    count = usable_cores() if workers is None else workers
-    with end_on_interrupt("interrupted: what is finished is kept, the same command goes on"):
-        for line in run_ships(out, seed, drawn, workers=count, shard=_parse_shard(shard) or (1, 1)):
-            typer.echo(line)
-
-
 def _parse_shard(shard: str | None) -> tuple[int, int] | None:
     """Part and number of parts of `i/n`."""
     part = re.fullmatch(r"(\d+)/(\d+)", shard or "")

@@ -228,11 +228,6 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         f"study run {STUDY} --workers 3 --scheduler tcp://here --set grid.N_D=[5] --shard 3/20 --device gpu",
         {"plan": is_changed, "workers": 3, "scheduler": "tcp://here", "device": "gpu", "shard": (3, 20)},
     ),
-    "study ships": (
-        "shipid.exchange.campaign:run_ships",
-        "study ships --out f --seed 3 --drawn 12 --workers 2 --shard 1/2",
-        {"folder": Path("f"), "seed": 3, "drawn": 12, "workers": 2, "shard": (1, 2)},
-    ),
     "study resume": (
         "shipid.study.run:run_study",
         "study resume folder --workers 3 --scheduler tcp://here --device gpu",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from shipid.exchange.law import CELL_COLUMNS, FLOOR_CENTRE, RESPONSES, Hierarchy
+from docs.exchange_fit import FLOOR_CENTRE
+from shipid.exchange.law import CELL_COLUMNS, RESPONSES, Hierarchy
 from shipid.units import GRAVITY
 
 KINDS = ("nominal", *["damping", "mass", "thrust", "missing", "moderate", "high"] * 2, "template", "sister", "none")

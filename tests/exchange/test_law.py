@@ -7,19 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.errors import ResultError, ShipidError
+from docs.exchange_fit import fit_hierarchy, fit_law, prior_of, save_law, ship_designs
+from shipid.errors import DataError, ResultError, ShipidError
 from shipid.exchange.law import (
     RESPONSES,
     SEAS,
     UnseenShip,
-    fit_hierarchy,
-    fit_law,
-    prior_of,
+    check_cells,
     read_law,
     response_rows,
     response_values,
-    save_law,
-    ship_designs,
 )
 from tests.exchange.drawn_cells import TRUE_SPREAD, TRUE_THETA, draw_cells, true_law
 
@@ -214,3 +211,25 @@ def test_what_was_seen_of_a_ship_tells_of_its_floor(law):
     before, after = np.mean(misses, axis=0)
     assert after < 0.6 * before
     assert np.mean(inside) > 0.8
+
+
+def test_cells_that_diverged_are_left_out(cells):
+    wild = cells.assign(H=cells["H"].where(cells["N_D"] > 1, np.nan))
+    assert set(check_cells(wild)["N_D"]) == {2, 4, 8, 16, 32, 64}
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"kind": "guess"}, "kind: 'guess' is no kind: give one of nominal, "),
+        ({"baseline": 0.0}, "baseline: 0 is not above 0"),
+        ({"A": -1.0}, "A: -1 is not above 0"),
+        ({"H": 0.0}, "H: 0 is not above 0"),
+        ({"floors": 1.0}, "floor: missing: a table of cells has the columns ship, type"),
+    ],
+)
+def test_a_wrong_value_is_one_line(cells, changed, words):
+    cells = cells.drop(columns="floor") if "floors" in changed else cells
+    with pytest.raises(DataError) as error:
+        check_cells(cells.assign(**changed))
+    assert words in str(error.value)

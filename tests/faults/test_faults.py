@@ -28,7 +28,6 @@ QUICK = {
     "function": 6,
     "predictions": 6,
     "package": 3,
-    "ships": 6,
     "options": 10,
     "damaged": 4,
     "killed": 3,
