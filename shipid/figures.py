@@ -197,8 +197,7 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
     if isinstance(source, CheckContent):
         content = source
     else:
-        from shipid.data.checks import check_dataset
-        from shipid.data.contents import check_content
+        from shipid.data.checks import check_content, check_dataset
 
         content = check_content("log", source, check_dataset(source))
     return _draw("motion-figure", content, [run], dark=dark)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import shipid
-from shipid.cli.answer import Answer, Json, open_answer
+from shipid.cli.answer import Answer, Json, end_on_interrupt, open_answer, show_steps
 from shipid.cli.options import (
     Changes,
     Device,
@@ -21,11 +21,10 @@ from shipid.cli.options import (
     StudyName,
     Trust,
     Workers,
+    check_output,
     document_stem,
     parse_changes,
 )
-from shipid.cli.outputs import check_output
-from shipid.cli.terminal import end_on_interrupt, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES, quote_argument, write_new
 from shipid.units import percent_text, plural_word

@@ -1,4 +1,4 @@
-"""Checks of a dataset: one row per run and check, each with a value, a limit and a sentence."""
+"""Checks of a dataset: one row per run and check, each with a value, a limit and a sentence; their page."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.arguments import check_class
 from shipid.data.dataset import (
@@ -22,9 +23,44 @@ from shipid.data.dataset import (
     travelled_position,
     unit_of_column,
 )
-from shipid.data.stuck import Plane, stuck_spans
 from shipid.errors import DataError
 from shipid.physics.signals import signal_row
+from shipid.report.logs import CheckContent
+
+RowMask = NDArray[np.bool_]
+Plane = NDArray[np.complex128]
+
+STUCK_SECONDS, STUCK_REPEATS = 4.5, 4.0  # s; times the usual repetition, at least
+MISSED_TURN, MISSED_WAY = np.radians(6.0), 0.02  # rad; share of the way: IMO MSC.96(72) allows a log 2 %
+MISSED_STEPS = 2.0  # large steps of a position
+
+
+def stuck_spans(
+    name: str, t: Array, values: Array, pose: tuple[Array, Plane], rates: tuple[Array, Plane], follows: RowMask
+) -> list[tuple[int, int]]:
+    """First and last row of each stretch in which a sensor repeats one value and the others say that it cannot.
+
+    name : psi, r, course or speed, of which values (N,) are readings at t [s]. pose : psi [rad] without jumps, and
+    position, north + i east [m]. rates : r [rad/s], and velocity over ground [m/s]. follows : (N - 1,)
+    whether nothing is missing between a row and the next.
+    """
+    edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ~follows, [True]]))
+    lengths = np.diff(edges)
+    long = lengths >= STUCK_REPEATS * np.median(np.repeat(lengths, lengths))
+    first, last = edges[:-1][long], edges[1:][long] - 1
+    turned = cumulative_integral(t, rates[0])
+    missed, least = {"psi": turned, "r": pose[0] - turned}.get(name, pose[0]), np.array(MISSED_TURN)
+    if name == "speed":
+        speed, steps = np.abs(rates[1]), np.diff(pose[1])
+        ahead = steps * np.exp(-1j * np.angle(rates[1][1:]))  # noise of a position makes no way
+        missed = np.append(0.0, np.cumsum(ahead.real)) - cumulative_integral(t, speed)
+        digit = np.median(np.abs(np.diff(speed))[np.diff(values) != 0]) if len(lengths) > 1 else 0.0
+        least = (MISSED_WAY * speed[first] + digit) * (t[last] - t[first])
+        least += MISSED_STEPS * np.percentile(np.abs(steps), 95)
+    off = np.array([np.ptp(missed[a : b + 1]) for a, b in zip(first, last, strict=True)])
+    stuck = (t[last] - t[first] >= STUCK_SECONDS) & (off > least)
+    return list(zip(first[stuck].tolist(), last[stuck].tolist(), strict=True))
+
 
 GAP_STEPS = 3.0  # usual steps: a longer one is a time without rows
 JITTER_LIMIT, FROZEN_LIMIT, OVERLAP_LIMIT = 0.05, 0.02, 0.5
@@ -248,3 +284,21 @@ def _share_of_same_motion(mine: _Motion, other: _Motion) -> float:
 def root_mean_square(values: Array) -> float:
     """Root mean square of values of any shape."""
     return float(np.sqrt(np.mean(values**2)))
+
+
+def check_content(name: str, log: Dataset, checks: pd.DataFrame) -> CheckContent:
+    """Return the content of the page of a log: `name` is a short name, `checks` the table from `check_dataset`."""
+    source = log.metadata.get("source", "")
+    words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
+    return CheckContent(
+        name=name,
+        checks=checks,
+        series=check_series(log),
+        tracks=log.frame[["run", "north", "east"]].assign(set="the log"),
+        repairs=pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"]),
+        provenance={
+            "log": words,
+            "vessel": str(log.metadata.get("vessel") or "not given"),
+            "rows": str(len(log.frame)),
+        },
+    )

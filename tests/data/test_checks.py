@@ -1,13 +1,16 @@
 """A clean log passes every check; each defect put into it fails the check for it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.checks import check_dataset, white_noise_of
-from shipid.data.dataset import cumulative_integral
+from shipid.data.checks import check_content, check_dataset, stuck_spans, white_noise_of
+from shipid.data.dataset import cumulative_integral, read_dataset
+from shipid.study.store import DATASET
 from tests.drawn import seeds
 from tests.logs.conftest import as_dataset, turning
 
@@ -159,3 +162,38 @@ def test_a_yaw_rate_in_degrees_fails_and_one_with_a_bias_and_noise_passes(seed: 
         assert "range r" not in failed(log.assign(r=read))
         if true.any():
             assert "range r" in failed(log.assign(r=np.degrees(read)))
+
+
+STEP, COUNT, FIRST, LAST = 0.5, 600, 200, 300
+
+
+@pytest.mark.parametrize("name", ["psi", "r", "course", "speed"])
+@pytest.mark.parametrize("seed", seeds(2, 10))
+def test_a_value_that_stays_in_a_turn_is_stuck_and_on_a_straight_course_it_is_not(seed: int, name: str) -> None:
+    random, t = np.random.default_rng(seed), STEP * np.arange(COUNT)
+    for most in (random.uniform(0.5, 1.5), 0.0):  # deg/s
+        r = np.radians(most) * np.sin(t / random.uniform(20.0, 60.0)) + most * 1e-4
+        psi, speed = np.cumsum(r) * STEP, 4.0 + most * np.sin(t / 30.0)
+        velocity = speed * np.exp(1j * psi)
+        seen = {"psi": psi, "r": r, "course": psi, "speed": speed}[name] + random.normal(0.0, 1e-4, COUNT)
+        repeated = np.concatenate([seen[:FIRST], np.full(LAST - FIRST, seen[FIRST]), seen[LAST:]])
+        parts = {"psi": psi, "r": r, "speed": speed}
+        if most and name in parts:
+            parts[name] = repeated
+        pose, rates = (parts["psi"], np.cumsum(velocity) * STEP), (parts["r"], parts["speed"] * np.exp(1j * psi))
+        spans = stuck_spans(name, t, repeated, pose, rates, np.ones(COUNT - 1, dtype=bool))
+        assert spans == ([(FIRST, LAST - 1)] if most else [])
+
+
+def test_the_page_of_a_log_holds_its_runs_and_repairs(tiny_run):
+    log = read_dataset(tiny_run / DATASET)
+    repair = {"kind": "jump", "column": "north", "count": 3, "note": "interpolated"}
+    log = type(log)(log.frame, {**log.metadata, "repairs": [repair], "source": {"file": "a.csv", "rows": 9}})
+    checks = check_dataset(log)
+    content = check_content("tiny", log, checks)
+    assert list(pd.unique(content.tracks["run"])) == log.runs
+    assert list(pd.unique(content.series["run"])) == log.runs
+    assert content.repairs.to_dict("records") == [repair]
+    assert content.provenance["log"] == "file a.csv, rows 9"
+    assert content.provenance["rows"] == str(len(log.frame))
+    assert content.answer[0].text.startswith(("All ", f"{int((~checks['ok'].astype(bool)).sum())} of "))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -12,15 +13,20 @@ import pytest
 from shipid.errors import DocumentError
 from shipid.measures.recognise import record_of
 from shipid.measures.zigzag import zigzag_measures
+from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import (
     KINDS,
     CrashStop,
     Excitation,
     Manoeuvre,
+    Request,
     Spiral,
     StepManoeuvre,
     TurningCircle,
     Zigzag,
+    aprbs_series,
+    limit_rate,
+    round_to_rows,
 )
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import DEGREE
@@ -197,3 +203,63 @@ def test_excitation_moves_within_its_limits() -> None:
 def test_impossible_blocks_are_refused(kind: str, block: dict[str, Any]) -> None:
     with pytest.raises(DocumentError):
         KINDS[kind](**block)
+
+
+def steps(**changes: Any) -> np.ndarray:
+    return aprbs_series(
+        np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes}
+    )
+
+
+def test_a_longer_series_begins_with_the_shorter() -> None:
+    time = np.arange(5001) * 0.1
+    short = aprbs_series(time[:1001], hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))
+    np.testing.assert_array_equal(aprbs_series(time, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
+    np.testing.assert_array_equal(
+        aprbs_series(time + 40.0, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short
+    )
+    assert not np.isin(short, steps(key=(7, 2))).any()
+
+
+def test_rate_limit_is_respected_and_caught_up_with() -> None:
+    ordered = np.stack([steps(), steps(key=(7, 2))], axis=1)
+    executed = limit_rate(ordered, 0.1, 0.5)
+    assert np.abs(np.diff(executed, axis=0)).max() <= 0.05 * (1 + 1e-9)
+    np.testing.assert_array_equal(limit_rate(ordered[:, 0], 0.1, 0.5), executed[:, 0])
+    assert executed.min() >= ordered.min()
+    assert executed.max() <= ordered.max()
+    assert np.mean(np.isclose(executed, ordered)) > 0.8  # 0.8 units at most take 1.6 s of holds of 4 s and more
+    ends = np.flatnonzero(np.diff(ordered[:, 0]) != 0)
+    np.testing.assert_allclose(executed[ends, 0], ordered[ends, 0])
+
+
+def test_levels_fill_their_range_evenly() -> None:
+    series = steps()
+    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
+    assert levels.min() >= -0.5
+    assert levels.max() < 0.3
+    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
+    for first in range(0, len(levels) - 8, 8):
+        assert sorted(eighth[first : first + 8]) == list(range(8))
+    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time
+
+
+KEYS = {"n_rpm": 120.0, "execute_at": 10.0, "course_deg": 0.0, "approach": "steady"}
+ASKED = Request(Controls(load_vessel("gunnerus-28.9")), 2.0, 3.0, (15.0,), "port", None, 8.0, 0.5, KEYS)
+
+
+def test_times_are_in_ship_lengths_unless_they_are_given() -> None:
+    """A log has what goes by before the first order, too."""
+    assert (ASKED.time(30), replace(ASKED, duration=70.0).time(30)) == (250.0, 70.0)
+
+
+def test_rows_are_whole() -> None:
+    assert [round_to_rows(time, ASKED.interval) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
+
+
+def test_a_turn_settles_in_time_constants_of_the_ship_within_limits() -> None:
+    """The number of lengths is that of the ship between 0 and 200; never less than asked."""
+    lengths = ASKED.settling(0.0)
+    assert 0 < lengths < 200
+    assert ASKED.settling(150.0) == pytest.approx(max(150.0, lengths))
+    assert replace(ASKED, passing=1e-6).settling(0.0) == 200.0
