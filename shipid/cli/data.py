@@ -169,7 +169,7 @@ def data_check(
     as_json: Json = False,
 ) -> None:
     """Check a dataset: its clock, ranges and frozen rows, and whether its signals are one motion."""
-    from shipid.data.held import warn_of_constant_commands
+    from shipid.data.checks import warn_of_constant_commands
     from shipid.identification.diagnosis import NONE, diagnose
 
     log, ship = shipid.read_dataset(dataset), shipid.load_vessel(vessel) if vessel else None
@@ -178,7 +178,7 @@ def data_check(
     counts = checks.assign(failed=checks.index.isin(failed.index)).groupby("check", sort=False)
     with open_answer(as_json) as answer:
         if html is not None:
-            from shipid.data.checks import check_content
+            from shipid.figures import check_content
             from shipid.report.logs import write_checks
 
             answer.say_page(write_checks(check_content(dataset.stem, log, checks), html))

@@ -19,6 +19,7 @@ from shipid.report.figure import (
     make_line,
     make_plot,
     page_colours,
+    ship_outline,
     spread_places,
 )
 from shipid.report.selection import accuracy_range, model_styles
@@ -115,3 +116,13 @@ def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
     assert len(set(colours)) == len(colours)
     symbols = {name.split("-")[0]: style.symbol for name, style in model_styles(simulation).items()}
     assert len(set(symbols.values())) == len(symbols)
+
+
+def test_the_outline_is_to_scale_closed_and_symmetric():
+    outline = ship_outline({"L_oa": 31.25, "L_pp": 28.9, "B": 9.6})
+    assert (np.ptp(outline[:, 0]), np.ptp(outline[:, 1])) == (31.25, 9.6)
+    np.testing.assert_array_equal(outline[0], outline[-1])
+    mirrored = {(x, -y) for x, y in outline.tolist()}
+    assert mirrored == set(map(tuple, outline.tolist()))
+    bow = outline[outline[:, 0].argmax()]
+    assert bow[1] == 0.0, "the bow is pointed and ahead"
