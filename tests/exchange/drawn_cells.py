@@ -1,7 +1,5 @@
 """Cells of ships drawn from a known law."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """The port-starboard mirror of a recorded dataset."""
 
-from __future__ import annotations
-
 from shipid.data.dataset import Dataset
 
 SIDES = {"port": "starboard", "starboard": "port"}

@@ -1,7 +1,5 @@
 """Kernel ridge regression as plain NumPy writes it; port and starboard are alike."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Zigzags of Nomoto's ship, whose overshoots are known in closed form."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

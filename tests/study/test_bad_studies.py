@@ -1,7 +1,5 @@
 """Broken study documents: one line each, with the file, the dotted path and what would be right."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
