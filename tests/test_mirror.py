@@ -23,6 +23,7 @@ ELSEWHERE = {
     },
     "export/fmu_c.py": "export/test_fmu.py",
     "engine/fmu_process.py": "foundations/test_fmu.py",
+    "version.py": "test_package.py",
 }
 
 
