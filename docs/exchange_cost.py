@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from exchange_fit import fit_law
 from numpy.typing import NDArray
 
 from shipid.exchange.cost import Ways, errors_in_use
-from shipid.exchange.law import ExchangeLaw, UnseenShip, fit_law, read_cell_table
+from shipid.exchange.law import ExchangeLaw, UnseenShip, check_cells
 from shipid.study.schema import Cost
 
 Array = NDArray[np.float64]
@@ -408,7 +409,7 @@ def main() -> None:
         mine = {name: (truth, GRID) for name, truth in ships_of_known_law(30, SEED + 3).items()}
         advice = advise_by(knowledge_of_known_law(SEED + 5))
     else:
-        cells = read_cell_table(file)
+        cells = check_cells(pd.read_csv(file), file)
         ships = ways_of_cells(cells)
         mine = {name: (errors_of_ship(ship), amounts_of(ship)) for name, ship in ships.items()}
         advice = advise_by(knowledge_of_law(cells, ships))

@@ -1,6 +1,7 @@
 """The law of exchange: fitted, and judged on ships and on types of ships that it has not seen.
 
-`python docs/exchange_law.py CELLS --write` fits the law to a table of cells and writes the file that comes with shipid;
+`python docs/exchange_law.py CELLS --write` fits the law to the cells of
+`docs/exchange_ships.py` and writes the file that comes with shipid;
 `--figure` draws its picture. Without them it judges: `python docs/records.py exchange-law python docs/exchange_law.py
 CELLS`. Every ship, and every type, is left out in turn: the law is fitted anew to the others.
 """
@@ -17,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
+from exchange_fit import fit_hierarchy, fit_law, save_law, ship_designs
 from pictures import IMAGES, svg
 from scipy.stats import t as student
 
@@ -31,14 +33,10 @@ from shipid.exchange.law import (
     Hierarchy,
     Response,
     UnseenShip,
+    check_cells,
     feature_columns,
-    fit_hierarchy,
-    fit_law,
-    read_cell_table,
     response_rows,
     response_values,
-    save_law,
-    ship_designs,
 )
 
 FORM = RESPONSES["H"]
@@ -258,7 +256,7 @@ def main() -> None:
     parser.add_argument("--figure", action="store_true", help="draw the picture of the page")
     given = parser.parse_args()
     warnings.filterwarnings("ignore", module="sklearn")
-    cells = read_cell_table(given.cells)
+    cells = check_cells(pd.read_csv(given.cells), given.cells)
     law = fit_law(cells)
     digest = hashlib.sha256(given.cells.read_bytes()).hexdigest()[:12]
     command = f"python docs/exchange_law.py {given.cells.name} --write"

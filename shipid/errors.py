@@ -23,6 +23,7 @@ RETIRED = {
     "rotate": 'it is retired: write [repeat] "split.test" into the study',
     "variants": "it is retired: factors and A are in the report of a run",
     "schema": "it is retired: errors name the valid keys",
+    "ships": "it is retired: `docs/exchange_ships.py` of the source makes the cells of the law",
     "--manoeuvres": "it is retired: `shipid study new --vessel FILE` writes a study of it, which `simulate` takes",
     "--step": "it is retired: a manoeuvre takes 1/500 of the time for a ship length",
     "--leave": "it is retired: take `study prepare` and `study run --shard i/n`",

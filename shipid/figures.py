@@ -198,7 +198,6 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
         content = source
     else:
         from shipid.data.checks import check_dataset
-        from shipid.data.contents import check_content
 
         content = check_content("log", source, check_dataset(source))
     return _draw("motion-figure", content, [run], dark=dark)
@@ -281,6 +280,26 @@ def content_of(source: Source) -> ReportContent:
 
     check_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")
     return report_content(source)
+
+
+def check_content(name: str, log: Dataset, checks: pd.DataFrame) -> CheckContent:
+    """Return the content of the page of a log: `name` is a short name, `checks` the table from `check_dataset`."""
+    from shipid.data.checks import check_series
+
+    source = log.metadata.get("source", "")
+    words = source if isinstance(source, str) else ", ".join(f"{key} {value}" for key, value in source.items())
+    return CheckContent(
+        name=name,
+        checks=checks,
+        series=check_series(log),
+        tracks=log.frame[["run", "north", "east"]].assign(set="the log"),
+        repairs=pd.DataFrame(log.metadata.get("repairs", []), columns=["kind", "column", "count", "note"]),
+        provenance={
+            "log": words,
+            "vessel": str(log.metadata.get("vessel") or "not given"),
+            "rows": str(len(log.frame)),
+        },
+    )
 
 
 def _manoeuvre(source: MeasuredManoeuvre | ManoeuvreContent) -> ManoeuvreContent:

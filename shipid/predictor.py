@@ -41,9 +41,9 @@ from shipid.metrics import vector_lengths
 from shipid.notebooks import NotebookView
 from shipid.observer import AGE_COLUMN, Observer
 from shipid.physics.signals import SIGNALS, measurable_signals
+from shipid.plugins import error_location, locate_errors
 from shipid.simulation.log import state_column
 from shipid.units import percent_text
-from shipid.users import error_location, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 

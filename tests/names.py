@@ -1,7 +1,5 @@
 """Names of a package: each says in another file what it is, and none stands in two modules. `python -m tests.names`."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

@@ -1,7 +1,5 @@
 """`python -m shipid` is the command `shipid`."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

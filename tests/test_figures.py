@@ -1,7 +1,5 @@
 """Every figure of the reports as a function, from results, contents or simple frames."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -13,21 +11,24 @@ import pytest
 
 from shipid import figures
 from shipid.answer.pages import report_content
+from shipid.data.checks import check_dataset
+from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
 from shipid.report.figure import page_colours
 from shipid.simulation.families import VesselFamily, read_family
 from shipid.study.results import read_results
+from shipid.study.store import DATASET
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family
-from tests.report import test_checks, test_identification, test_motion, test_shares
+from tests.report import test_identification, test_logs, test_motion, test_shares
 from tests.report.test_cost import priced
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
     **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
     "shares": test_shares.content,
-    "motion": lambda: test_checks.content("log"),
+    "motion": lambda: test_logs.content("log"),
     "spread": lambda: read_family("quick", "moderate").trajectories("zigzag", 20),
 }
 
@@ -134,3 +135,17 @@ def test_the_path_of_a_prediction_is_the_recorded_one(content: ReportContent) ->
         figures.prediction(content, run="M9")
     with pytest.raises(ShipidError, match="N_D: '5' is none"):
         figures.prediction(content, N_D=5)
+
+
+def test_the_page_of_a_log_holds_its_runs_and_repairs(tiny_run):
+    log = read_dataset(tiny_run / DATASET)
+    repair = {"kind": "jump", "column": "north", "count": 3, "note": "interpolated"}
+    log = type(log)(log.frame, {**log.metadata, "repairs": [repair], "source": {"file": "a.csv", "rows": 9}})
+    checks = check_dataset(log)
+    content = figures.check_content("tiny", log, checks)
+    assert list(pd.unique(content.tracks["run"])) == log.runs
+    assert list(pd.unique(content.series["run"])) == log.runs
+    assert content.repairs.to_dict("records") == [repair]
+    assert content.provenance["log"] == "file a.csv, rows 9"
+    assert content.provenance["rows"] == str(len(log.frame))
+    assert content.answer[0].text.startswith(("All ", f"{int((~checks['ok'].astype(bool)).sum())} of "))

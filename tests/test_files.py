@@ -1,7 +1,5 @@
 """Files appear whole or not at all, whatever goes wrong while they are written."""
 
-from __future__ import annotations
-
 import errno
 import io
 import json

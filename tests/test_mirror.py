@@ -1,7 +1,5 @@
 """Every source file has a test file of the same name in the mirrored folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -25,6 +23,7 @@ ELSEWHERE = {
     },
     "export/fmu_c.py": "export/test_fmu.py",
     "engine/fmu_process.py": "foundations/test_fmu.py",
+    "version.py": "test_package.py",
 }
 
 

@@ -1,7 +1,5 @@
 """The observer: laws of its equations, causality, missing samples, and what it buys in seeded worlds."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a wheel says of itself: nothing that only a copy of the repository has, authors as in CITATION.cff."""
 
-from __future__ import annotations
-
 import email
 import re
 import subprocess
@@ -10,6 +8,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+import shipid
+from shipid import version
 
 ROOT = Path(__file__).parents[1]
 
@@ -33,3 +34,12 @@ def test_a_wheel_has_no_link_into_the_repository(tmp_path: Path) -> None:
     assert {"dask", "docs", "export", "forest"} <= set(metadata.get_all("Provides-Extra"))
     assert {"shipid/_bundled/studies/quick.toml", "shipid/_bundled/models/mariner.toml"} <= set(files)
     assert not [file for file in files if file.startswith(("tests/", "docs/"))]
+
+
+def test_the_version_is_the_one_of_the_file() -> None:
+    assert shipid.__version__ == version.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+(\.dev\d+|rc\d+)?", version.__version__)
+
+
+def test_the_file_imports_nothing() -> None:
+    assert "import" not in Path(version.__file__).read_text(encoding="utf-8").split('"""')[2]

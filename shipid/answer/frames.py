@@ -22,12 +22,12 @@ from shipid.metrics import (
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
 from shipid.report.content import TRIAL_COLUMNS, PathKey, model_text
+from shipid.report.figure import ship_outline
 from shipid.report.selection import FEW_RUNS, figure_sizes, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
 from shipid.study.plan import grid_seeds, learns_from_runs, vessels_of
 from shipid.study.results import Results
-from shipid.vessel.outline import ship_outline
 
 ALL_KINDS = "all"
 CLOCK = 6  # digits after the point of a time in a run [s]

@@ -16,8 +16,8 @@ from typer.models import CommandInfo
 
 import shipid
 from shipid.cli import data, expect, family, identify, predict, simulation, study, vessel
-from shipid.cli.outputs import GuardedCommand
-from shipid.cli.terminal import log_to_stderr
+from shipid.cli.answer import log_to_stderr
+from shipid.cli.options import GuardedCommand
 from shipid.errors import RETIRED, ShipidError, is_utf_8
 from shipid.plugins import import_files
 

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 import shipid
-from shipid.cli.answer import Answer, Json, open_answer
-from shipid.cli.options import MappingName
-from shipid.cli.outputs import check_output
-from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, show_steps
+from shipid.cli.answer import CRITERIA, MEASURE_FORMATS, MEASURES, Answer, Json, open_answer, show_steps
+from shipid.cli.options import MappingName, check_output
 from shipid.errors import DataError, ShipidError
 from shipid.files import write_new
 from shipid.units import percent_text, plural_word
@@ -171,7 +169,7 @@ def data_check(
     as_json: Json = False,
 ) -> None:
     """Check a dataset: its clock, ranges and frozen rows, and whether its signals are one motion."""
-    from shipid.data.held import warn_of_constant_commands
+    from shipid.data.checks import warn_of_constant_commands
     from shipid.identification.diagnosis import NONE, diagnose
 
     log, ship = shipid.read_dataset(dataset), shipid.load_vessel(vessel) if vessel else None
@@ -180,7 +178,7 @@ def data_check(
     counts = checks.assign(failed=checks.index.isin(failed.index)).groupby("check", sort=False)
     with open_answer(as_json) as answer:
         if html is not None:
-            from shipid.data.contents import check_content
+            from shipid.figures import check_content
             from shipid.report.logs import write_checks
 
             answer.say_page(write_checks(check_content(dataset.stem, log, checks), html))

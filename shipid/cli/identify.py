@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import shipid
-from shipid.cli.answer import Answer, Json, open_answer
-from shipid.cli.options import VesselName, command_line, document_stem, parse_assignments, parse_changes
-from shipid.cli.outputs import check_output
-from shipid.cli.terminal import MOTION, MOTION_FORMATS, end_on_interrupt, show_steps
+from shipid.cli.answer import MOTION, MOTION_FORMATS, Answer, Json, end_on_interrupt, open_answer, show_steps
+from shipid.cli.options import VesselName, check_output, command_line, document_stem, parse_assignments, parse_changes
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.units import join_names, plural_word
 

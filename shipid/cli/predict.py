@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 import shipid
-from shipid.cli.options import Adaptive, Folder, Kind, Level, check_band, command_line
-from shipid.cli.outputs import check_output
+from shipid.cli.options import Adaptive, Folder, Kind, Level, check_band, check_output, command_line
 from shipid.errors import DocumentError, ShipidError
 from shipid.files import TABLES
 from shipid.units import percent_text

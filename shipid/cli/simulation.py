@@ -9,10 +9,17 @@ from typing import Annotated, Literal
 import typer
 
 import shipid
-from shipid.cli.answer import Json, open_answer
-from shipid.cli.options import Changes, StudyName, Trust, VesselName, command_line, document_stem, parse_changes
-from shipid.cli.outputs import check_output
-from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, MOTION, MOTION_FORMATS
+from shipid.cli.answer import CRITERIA, MEASURE_FORMATS, MEASURES, MOTION, MOTION_FORMATS, Json, open_answer
+from shipid.cli.options import (
+    Changes,
+    StudyName,
+    Trust,
+    VesselName,
+    check_output,
+    command_line,
+    document_stem,
+    parse_changes,
+)
 from shipid.errors import DataError, DocumentError
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import shipid
-from shipid.cli.answer import Answer, Json, open_answer
+from shipid.cli.answer import Answer, Json, end_on_interrupt, open_answer, show_steps
 from shipid.cli.options import (
     Changes,
     Device,
@@ -21,11 +21,10 @@ from shipid.cli.options import (
     StudyName,
     Trust,
     Workers,
+    check_output,
     document_stem,
     parse_changes,
 )
-from shipid.cli.outputs import check_output
-from shipid.cli.terminal import end_on_interrupt, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES, quote_argument, write_new
 from shipid.units import percent_text, plural_word
@@ -157,26 +156,6 @@ def study_run(
     part = _parse_shard(shard)
     plan = shipid.read_plan(study, parse_changes(changes), trust=trust)
     _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, part)
-
-
-@app.command("ships")
-def study_ships(
-    out: Annotated[Path, typer.Option(help="folder of the cells; a second start goes on there")] = Path(
-        "results/ships"
-    ),
-    seed: Annotated[int, typer.Option(min=0, help="of the drawn ships and their runs")] = 0,
-    drawn: Annotated[int, typer.Option(min=10, help="number of drawn ships")] = 30,
-    workers: Workers = None,
-    shard: Annotated[str | None, typer.Option(help="i/n: every n-th ship from the i-th on")] = None,
-) -> None:
-    """Study every bundled ship and drawn ones: the error over physics, runs and horizon, a table for the law."""
-    from shipid.capacity import usable_cores
-    from shipid.exchange.campaign import run_ships
-
-    count = usable_cores() if workers is None else workers
-    with end_on_interrupt("interrupted: what is finished is kept, the same command goes on"):
-        for line in run_ships(out, seed, drawn, workers=count, shard=_parse_shard(shard) or (1, 1)):
-            typer.echo(line)
 
 
 def _parse_shard(shard: str | None) -> tuple[int, int] | None:

@@ -9,10 +9,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 import shipid
-from shipid.cli.answer import Json, open_answer
-from shipid.cli.options import VesselName
-from shipid.cli.outputs import check_output
-from shipid.cli.terminal import CRITERIA
+from shipid.cli.answer import CRITERIA, Json, open_answer
+from shipid.cli.options import VesselName, check_output
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from shipid.arguments import check_class
 from shipid.data.dataset import (
@@ -22,9 +23,44 @@ from shipid.data.dataset import (
     travelled_position,
     unit_of_column,
 )
-from shipid.data.stuck import Plane, stuck_spans
 from shipid.errors import DataError
 from shipid.physics.signals import signal_row
+from shipid.units import DEGREE, join_names, plural_word
+
+RowMask = NDArray[np.bool_]
+Plane = NDArray[np.complex128]
+
+STUCK_SECONDS, STUCK_REPEATS = 4.5, 4.0  # s; times the usual repetition, at least
+MISSED_TURN, MISSED_WAY = np.radians(6.0), 0.02  # rad; share of the way: IMO MSC.96(72) allows a log 2 %
+MISSED_STEPS = 2.0  # large steps of a position
+
+
+def stuck_spans(
+    name: str, t: Array, values: Array, pose: tuple[Array, Plane], rates: tuple[Array, Plane], follows: RowMask
+) -> list[tuple[int, int]]:
+    """First and last row of each stretch in which a sensor repeats one value and the others say that it cannot.
+
+    name : psi, r, course or speed, of which values (N,) are readings at t [s]. pose : psi [rad] without jumps, and
+    position, north + i east [m]. rates : r [rad/s], and velocity over ground [m/s]. follows : (N - 1,)
+    whether nothing is missing between a row and the next.
+    """
+    edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ~follows, [True]]))
+    lengths = np.diff(edges)
+    long = lengths >= STUCK_REPEATS * np.median(np.repeat(lengths, lengths))
+    first, last = edges[:-1][long], edges[1:][long] - 1
+    turned = cumulative_integral(t, rates[0])
+    missed, least = {"psi": turned, "r": pose[0] - turned}.get(name, pose[0]), np.array(MISSED_TURN)
+    if name == "speed":
+        speed, steps = np.abs(rates[1]), np.diff(pose[1])
+        ahead = steps * np.exp(-1j * np.angle(rates[1][1:]))  # noise of a position makes no way
+        missed = np.append(0.0, np.cumsum(ahead.real)) - cumulative_integral(t, speed)
+        digit = np.median(np.abs(np.diff(speed))[np.diff(values) != 0]) if len(lengths) > 1 else 0.0
+        least = (MISSED_WAY * speed[first] + digit) * (t[last] - t[first])
+        least += MISSED_STEPS * np.percentile(np.abs(steps), 95)
+    off = np.array([np.ptp(missed[a : b + 1]) for a, b in zip(first, last, strict=True)])
+    stuck = (t[last] - t[first] >= STUCK_SECONDS) & (off > least)
+    return list(zip(first[stuck].tolist(), last[stuck].tolist(), strict=True))
+
 
 GAP_STEPS = 3.0  # usual steps: a longer one is a time without rows
 JITTER_LIMIT, FROZEN_LIMIT, OVERLAP_LIMIT = 0.05, 0.02, 0.5
@@ -32,6 +68,11 @@ ROUGHNESS_RATIO = 1.2  # times, on an uneven clock or on an even one: this one i
 DRIFT_SECONDS = 30.0
 TURN_RATIO = 6.0  # far from 1, and from the 57 of degrees taken for radians
 ALIKE_TURNS = 0.9  # least correlation of turns by r and by the heading
+FEEDBACK_NOISE = {True: 0.5 * DEGREE, False: 0.01}
+"""Standard deviation that counts as none, of angles [rad] and as a share of others: assumed for measured feedback."""
+KICK_SIZE = 4.0  # times this noise: a departure that is an order, where it lasts
+# Seconds between the rows around a departure, and share of rows: below, faulty rows and no order.
+SPIKE_SECONDS, SPIKE_SHARE = 3.0, 1e-3
 
 
 def check_dataset(dataset: Dataset) -> pd.DataFrame:
@@ -243,3 +284,46 @@ def _share_in_other_run(mine: _Motion, other: _Motion, shared: bool) -> float:
 def _share_of_same_motion(mine: _Motion, other: _Motion) -> float:
     """Share of the rows of a run that have the motion of a row of another run."""
     return float(np.mean(np.isin(mine.keys, other.keys))) if mine.lively else 0.0
+
+
+def constant_commands(dataset: Dataset, runs: Iterable[str]) -> tuple[str, ...]:
+    """Commands that are the same in every row of some runs, but for measuring noise and a faulty row in a thousand.
+
+    One that varies in one run varies, also where that is for a few seconds of a long run.
+    """
+    frame = dataset.frame[dataset.frame["run"].isin(list(runs))]
+    by_run, held = frame.groupby("run", sort=False), []
+    for name in dataset.commands:
+        usual = by_run[name].median()
+        row = signal_row(name)
+        angle = row is not None and row.angle
+        noise = FEEDBACK_NOISE[angle] * (1.0 if angle else float(usual.abs().max()))
+        if (
+            len(usual)
+            and np.ptp(usual) <= noise
+            and all(_is_constant(run["t"].to_numpy(float), run[name].to_numpy(float), noise) for _, run in by_run)
+        ):
+            held.append(name)
+    return tuple(held)
+
+
+def _is_constant(t: Array, values: Array, noise: float) -> bool:
+    """Whether a command is the same in every row of a run; t, values : its rows; noise : standard deviation."""
+    far = np.abs(values - np.median(values)) > KICK_SIZE * noise
+    first, behind = np.flatnonzero(np.diff(far, prepend=False, append=False)).reshape(-1, 2).T
+    lasting = t[np.minimum(behind, len(t) - 1)] - t[np.maximum(first - 1, 0)]
+    return bool(far.mean() <= SPIKE_SHARE and (lasting < SPIKE_SECONDS).all() and values[~far].std() <= noise)
+
+
+def warn_of_constant_commands(dataset: Dataset, runs: Iterable[str]) -> list[str]:
+    """A sentence where some runs vary no command at all; none where they vary one, as ships at one shaft speed do."""
+    runs = list(runs)
+    held = constant_commands(dataset, runs)
+    if not held or len(held) < len(dataset.commands):
+        return []
+    are, do = plural_word(len(held), "is", "are"), plural_word(len(held), "it does", "they do")
+    where = f"in all {len(runs)} runs" if len(runs) > 1 else "throughout the only run"
+    return [
+        f"{join_names(held)} {are} the same {where}: what {do} cannot be learnt from this log, nor can damping be told "
+        "from the force that steers, or resistance from thrust"
+    ]

@@ -12,8 +12,7 @@ from types import MappingProxyType
 
 import casadi as ca
 
-from shipid.engine.graph import InstructionGraph, apply_operation
-from shipid.engine.tables import RampTable, TableLookup
+from shipid.engine.tables import InstructionGraph, RampTable, TableLookup, apply_operation
 
 ARITHMETIC = {  # the same in every dialect
     ca.OP_NEG: "(-{0})",

@@ -6,7 +6,7 @@ a = ln(A / baseline), p = ln(floor / baseline), h = ln(ahead / 2):
     ln(H / baseline) = ln(sqrt(R^2 + F^2)) + effects + rest,    R = exp(theta . features),    F = exp(c + p)
 
 R is what data can reduce, F the floor of sea and sensors. Effects of a ship, of a kind of physics on a ship, of a
-foundation and of the runs drawn are Gaussian with variances that the cells tell (`fit_hierarchy`).
+foundation and of the runs drawn are Gaussian with variances that the cells tell (`docs/exchange_fit.py`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,9 @@ import numpy as np
 import pandas as pd
 
 from shipid.errors import DataError, ResultError, ShipidError
-from shipid.files import open_file, read_json, write_json
+from shipid.files import read_json
 from shipid.study.schema import KINDS_OF_PHYSICS
 from shipid.units import GRAVITY
-from shipid.version import __version__
 
 CELL_COLUMNS = {
     "ship": "name",
@@ -45,24 +44,11 @@ CELL_KINDS = (*KINDS_OF_PHYSICS, "none")
 NUMBERS = ("length", "speed", "froude", "N_D", "ahead", "H", "baseline", "floor")
 
 
-def read_cell_table(file: Path) -> pd.DataFrame:
-    """Read a table of cells, CSV or Parquet; rows without a finite H, whose prediction diverged, are left out.
-
-    Raises DataError for what is no table, a column that is missing, a kind that the law does not know, and a number
-    that is not above 0.
-    """
-    with open_file(file) as source:
-        try:
-            frame = pd.read_csv(source) if file.suffix == ".csv" else pd.read_parquet(source)
-            frame = frame.astype({name: float for name in (*NUMBERS, "A") if name in frame})
-        except ValueError as error:
-            reason = str(error).partition("\n")[0]
-            raise DataError(f"is no table of cells, CSV or Parquet ({reason})", file=file) from error
-    return check_cells(frame, file)
-
-
 def check_cells(cells: pd.DataFrame, file: Path | None = None) -> pd.DataFrame:
-    """Cells with a finite H, their values checked as those of `read_cell_table`; an empty kind is not known."""
+    """Cells with a finite H; rows whose prediction diverged are left out, and an empty kind is not known.
+
+    Raises DataError for a column that is missing, a kind that the law does not know, and a number that is not above 0.
+    """
     if missing := [name for name in CELL_COLUMNS if name not in cells]:
         raise DataError(
             f"missing: a table of cells has the columns {', '.join(CELL_COLUMNS)}", file=file, path=missing[0]
@@ -147,10 +133,6 @@ SEAS = ("calm", "ordinary", "rough")
 ASKED = "asked"  # name of the ship that the law is asked about
 ANY = "any"  # kind of a physics of which A is all that is known: each draw has another one
 LIMITED = ("length", "froude", "N_D", "ahead", "A")
-CENTRE, FLOOR_CENTRE = {"1": -2.0, "a": 1.0, "n": -0.4}, {"1": -0.5, "p": 1.0}
-"""Means of the priors of H that are not 0: a share of A, falling with runs, beside a share of the floor."""
-MOST_STEP = 0.5  # of theta in one round
-WIDE, NARROW = 3.0, 0.3  # standard deviations of the Gaussian priors of features, and of those of a kind
 
 
 def feature_columns(cells: pd.DataFrame, names: Sequence[str]) -> Array:
@@ -191,7 +173,7 @@ class Hierarchy:
 
     def mean(self, cells: pd.DataFrame) -> tuple[Array, Array]:
         """ln(value / unit) (rows,) without effects, and its derivatives (rows, P) by theta."""
-        return mean_of_features(self.theta, *_both_features(self.response, cells))
+        return mean_of_features(self.theta, *both_features(self.response, cells))
 
     def spread(self, cells: pd.DataFrame, jacobian: Array, known: int = 0) -> Array:
         """Covariance (rows, rows) of cells of one ship: effects, rest, and what is unknown of theta.
@@ -249,7 +231,7 @@ class Hierarchy:
         return float(max(self.ships - sum(level == SHIP for level, _ in self.response.levels), 3))
 
 
-def _both_features(response: Response, cells: pd.DataFrame) -> tuple[Array, Array]:
+def both_features(response: Response, cells: pd.DataFrame) -> tuple[Array, Array]:
     """Features (rows, F) of what data reduce, and (rows, G) of the floor."""
     return tuple(np.split(feature_columns(cells, response.features + response.floor), [len(response.features)], axis=1))  # type: ignore[return-value]
 
@@ -288,129 +270,6 @@ def response_rows(response: Response, cells: pd.DataFrame) -> pd.DataFrame:
     if response.value == "A":
         return cells[~cells["kind"].isin(["none", ""])].drop_duplicates(["ship", "foundation", "ahead"])
     return cells.drop_duplicates(["ship", "ahead"])
-
-
-@dataclass(frozen=True)
-class ShipDesign:
-    """Rows of one ship, sorted by cell: values (rows,), both features, and what makes their covariance.
-
-    effects (rows, G) with their levels (G,), all but those of a cell and a row. starts, counts (cells,): rows of each
-    cell; weights (cells, inner levels): squared features of the levels of a cell.
-    """
-
-    values: Array
-    features: Array
-    floor: Array
-    effects: Array
-    levels: Array
-    starts: Array
-    counts: Array
-    weights: Array
-
-    @classmethod
-    def of(cls, response: Response, cells: pd.DataFrame) -> ShipDesign:
-        """Design of the rows of one ship."""
-        rows = cells.iloc[np.argsort(group_codes(cells, CELL), kind="stable")]
-        features = feature_columns(rows, [feature for _, feature in response.levels])
-        effects, levels = [], []
-        for place, (level, _) in enumerate(response.levels[:-1]):
-            if level != CELL:
-                code = group_codes(rows, level)
-                effects.append(np.where(code[:, None] == np.unique(code), features[:, [place]], 0.0))
-                levels += [place] * effects[-1].shape[1]
-        starts = np.unique(group_codes(rows, CELL), return_index=True)[1]
-        inner = [place for place, (level, _) in enumerate(response.levels) if level == CELL]
-        return cls(
-            response_values(response, rows),
-            *_both_features(response, rows),
-            np.hstack(effects),
-            np.array(levels),
-            starts,
-            np.diff([*starts, len(rows)]),
-            features[starts][:, inner] ** 2,
-        )
-
-    def sums(self, columns: Array) -> Array:
-        """Sums (cells, ...) of columns (rows, ...) over the rows of each cell."""
-        return np.asarray(np.add.reduceat(columns, self.starts, axis=0))
-
-    def whiten(self, columns: Array, shrink: Array, rest: float) -> Array:
-        """Columns (rows, K) times the inverse root of the covariance of cells and rows."""
-        means = self.sums(columns) / self.counts[:, None]
-        return np.asarray((columns - np.repeat(shrink[:, None] * means, self.counts, axis=0)) / np.sqrt(rest))
-
-
-def ship_designs(response: Response, cells: pd.DataFrame) -> dict[str, ShipDesign]:
-    """Ship -> design of the cells that teach a response."""
-    ships = response_rows(response, cells).groupby("ship", sort=False)
-    return {str(name): ShipDesign.of(response, part) for name, part in ships}
-
-
-def fit_hierarchy(
-    response: Response, ships: Sequence[ShipDesign], start: Hierarchy | None = None, rounds: int = 100
-) -> Hierarchy:
-    """Fit a response to the cells of many ships by restricted maximum likelihood and Gaussian priors.
-
-    Each round is a step of Gauss and Newton for theta and one of minorisation and maximisation for the variances
-    (Zhou et al., Journal of Computational and Graphical Statistics 28 (2019) 350), which never lowers the likelihood:
-
-        s <- s sqrt(r' V^-1 K V^-1 r / tr(P K)),    r = y - mean,    P = V^-1 - V^-1 J C J' V^-1
-
-    start : a fit to begin with. rounds : at most; they end where no standard deviation changes by more than 1 %.
-    """
-    centre, widths = prior_of(response)
-    theta = start.theta if start else centre
-    variances = start.variances if start else np.full(len(response.levels), 0.03)
-    for _ in range(rounds):
-        theta, covariance, factor = _improve(response, ships, theta, variances, centre, np.diag(widths**-2))
-        variances = np.maximum(variances * factor, 1e-8)
-        if np.abs(np.log(factor[variances > 1e-4])).max(initial=0.0) < 0.02:
-            break
-    return Hierarchy(response, theta, covariance, variances, len(ships))
-
-
-def prior_of(response: Response) -> tuple[Array, Array]:
-    """Means and standard deviations (P,) of the Gaussian priors of theta."""
-    widths = [NARROW if name.split(":")[0] in FLAWS and response.floor else WIDE for name in response.features]
-    centre = [CENTRE.get(name, 0.0) * bool(response.floor) for name in response.features]
-    centre += [FLOOR_CENTRE.get(name, 0.0) for name in response.floor]
-    return np.array(centre), np.array(widths + [WIDE if name in NO_PHYSICS else 1.0 for name in response.floor])
-
-
-def _improve(
-    response: Response, ships: Sequence[ShipDesign], theta: Array, variances: Array, centre: Array, prior: Array
-) -> tuple[Array, Array, Array]:
-    """Theta after one step, its covariance, and the factors (levels,) of the variances."""
-    inner = np.array([level == CELL for level, _ in response.levels])
-    rest, normal, right, solved = variances[-1], prior.copy(), prior @ (centre - theta), []
-    for ship in ships:
-        within = ship.weights @ variances[inner]
-        shrink = 1 - np.sqrt(rest / (rest + ship.counts * within))
-        mean, jacobian = mean_of_features(theta, ship.features, ship.floor)
-        joined = ship.whiten(np.column_stack([ship.effects, jacobian, ship.values - mean]), shrink, rest)
-        effects, plain = np.split(joined, [ship.effects.shape[1]], axis=1)
-        scaled = effects * np.sqrt(variances[ship.levels])
-        root = np.linalg.cholesky(np.eye(scaled.shape[1]) + scaled.T @ scaled)
-        taken = np.linalg.solve(root, scaled.T).T
-        slopes = plain - taken @ (taken.T @ plain)
-        normal += plain[:, :-1].T @ slopes[:, :-1]
-        right += slopes[:, :-1].T @ plain[:, -1]
-        solved.append((ship, effects, taken, slopes, within, shrink))
-    covariance = np.linalg.inv(normal)
-    step, spread = np.clip(covariance @ right, -MOST_STEP, MOST_STEP), np.linalg.cholesky(covariance)
-    quadratic, trace = np.zeros((2, len(variances)))
-    for ship, effects, taken, slopes, within, shrink in solved:
-        residual = slopes[:, -1:] - slopes[:, :-1] @ step[:, None]
-        taken = np.hstack([taken, slopes[:, :-1] @ spread])
-        np.add.at(quadratic, ship.levels, (effects.T @ residual)[:, 0] ** 2)
-        np.add.at(trace, ship.levels, (effects**2).sum(axis=0) - ((taken.T @ effects) ** 2).sum(axis=0))
-        residual, taken = (ship.whiten(one, shrink, rest) for one in (residual, taken))
-        total = rest + ship.counts * within
-        quadratic[inner] += ship.weights.T @ ship.sums(residual)[:, 0] ** 2
-        trace[inner] += ship.weights.T @ (ship.counts / total - (ship.sums(taken) ** 2).sum(axis=1))
-        quadratic[-1] += (residual**2).sum()
-        trace[-1] += ((ship.counts - 1 + rest / total) / rest).sum() - (taken**2).sum()
-    return theta + step, covariance, np.sqrt(quadratic / trace)
 
 
 @dataclass(frozen=True)
@@ -569,29 +428,7 @@ def _cells_to_draw(
     return pd.DataFrame(rows)
 
 
-def fit_law(cells: pd.DataFrame) -> ExchangeLaw:
-    """Fit the law to the cells of many ships; see `fit_hierarchy`."""
-    cells = check_cells(cells)
-    parts = {
-        name: fit_hierarchy(response, [*ship_designs(response, cells).values()]) for name, response in RESPONSES.items()
-    }
-    sizes = cells.assign(A=cells["A"] / cells["length"])
-    limits = {name: (float(sizes[name].min()), float(sizes[name].max())) for name in LIMITED}
-    taught = {"cells": len(cells), "ships": int(cells["ship"].nunique()), "version": __version__}
-    return ExchangeLaw(parts, limits, taught)
-
-
-def save_law(law: ExchangeLaw, file: Path) -> None:
-    """Write a law as JSON: of each response theta, covariance, variances and ships, then limits and provenance."""
-    parts = {
-        name: _response_names(part.response)
-        | {key: getattr(part, key) for key in ("theta", "covariance", "variances", "ships")}
-        for name, part in law.parts.items()
-    }
-    write_json(file, {"parts": parts, "limits": law.limits, "provenance": law.provenance})
-
-
-def _response_names(response: Response) -> dict[str, list[str]]:
+def response_names(response: Response) -> dict[str, list[str]]:
     """What the numbers of a law belong to: features, then those of the floor, and levels."""
     return {
         "features": [*response.features, *response.floor],
@@ -608,7 +445,7 @@ def read_law(file: Path = LAW_FILE) -> ExchangeLaw:
     try:
         for name, response in RESPONSES.items():
             part = content["parts"][name]
-            if not _response_names(response).items() <= part.items():
+            if not response_names(response).items() <= part.items():
                 raise ResultError("has other features than this version of shipid: fit it anew", file=file, path=name)
             theta, covariance, variances = (np.array(part[key], float) for key in ("theta", "covariance", "variances"))
             parts[name] = Hierarchy(response, theta, covariance, variances, part["ships"])

@@ -35,8 +35,8 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.simulated import SimulatedPhysics
 from shipid.observer import ESTIMATE_COLUMNS
 from shipid.physics.signals import signal_of, signal_row
+from shipid.plugins import error_location, is_user_code, locate_errors
 from shipid.simulation.log import state_column
-from shipid.users import error_location, is_user_code, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
 
 Array = np.ndarray

@@ -19,8 +19,7 @@ from shipid.hybrid.physics import Needs
 from shipid.hybrid.simulated import Array, NamedSimulator
 from shipid.observer import MEASURED_MOTION
 from shipid.physics.signals import measurable_signals
-from shipid.plugins import Registry, fault_of_kind, import_user_module
-from shipid.users import locate_errors, users_code
+from shipid.plugins import Registry, fault_of_kind, import_user_module, locate_errors, users_code
 
 SimulateFunction = Callable[..., Any]
 FUNCTIONS: Registry[SimulateFunction] = Registry("shipid.foundations", partial(fault_of_kind, Callable))

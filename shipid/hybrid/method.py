@@ -20,7 +20,7 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.features import NO_MEMORY, Inputs, Memory
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.physics import Needs, Physics
-from shipid.users import definition_file, locate_errors
+from shipid.plugins import definition_file, locate_errors
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
 from shipid.arguments import as_names, check_class, check_function_or_none, check_number
+from shipid.data.checks import constant_commands, warn_of_constant_commands
 from shipid.data.dataset import Array, Dataset, without_shared_moments
-from shipid.data.held import constant_commands, warn_of_constant_commands
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name

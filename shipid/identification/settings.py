@@ -16,8 +16,8 @@ from shipid.checked import CheckedModel
 from shipid.data.dataset import Array
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, suggest_name
-from shipid.identification.late import Changes
 from shipid.identification.plausible import plausible_factors
+from shipid.identification.segments import Changes
 from shipid.physics.signals import is_output, rows_of_role
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import select_paths

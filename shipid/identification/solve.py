@@ -26,9 +26,8 @@ from shipid.identification.fit import (
     initial_point,
     search_factors,
 )
-from shipid.identification.late import COARSE, row_interval
 from shipid.identification.residuals import CURRENT, Problem, build_problem, typical_errors
-from shipid.identification.segments import ShootingSegment
+from shipid.identification.segments import COARSE, ShootingSegment, row_interval
 from shipid.identification.settings import (
     BLOCK,
     ENVIRONMENT,

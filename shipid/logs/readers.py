@@ -42,8 +42,7 @@ from shipid.logs.rosbag import is_bag, read_bag
 from shipid.logs.topics import TopicReader, reads_topics, topic_rows
 from shipid.logs.ulog import is_ulog, read_ulog
 from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_with_values
-from shipid.plugins import Registry, fault_of_kind
-from shipid.users import locate_errors
+from shipid.plugins import Registry, fault_of_kind, locate_errors
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
 LARGE = 4_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for

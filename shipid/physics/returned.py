@@ -9,8 +9,8 @@ from typing import Any
 from shipid.errors import ShipidError
 from shipid.physics import symbols as ca
 from shipid.physics.frames import SX
+from shipid.plugins import definition_location, is_user_code
 from shipid.units import join_names, plural_word
-from shipid.users import definition_location, is_user_code
 
 
 def check_returned(

@@ -9,7 +9,7 @@ import html
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any, TypeAlias
@@ -338,3 +338,21 @@ def _scale_bar(scale: ColourScale) -> Trace:
         "marker": marker,
         "showlegend": False,
     }
+
+
+LENGTH, SLENDERNESS = 30.0, 6.0  # of a ship whose particulars do not say: m; length over beam
+
+
+def ship_outline(particulars: Mapping[str, float]) -> np.ndarray:
+    """Return the outline (k, 2) of a ship from above [m]: a box with a pointed bow.
+
+    Body axes: the first column is ahead, the second to starboard, midships at 0, 0.
+
+    particulars : of a vessel [m]: L_oa, else L_pp, else 30 m; B, else a sixth of the length.
+    """
+    length = particulars.get("L_oa", particulars.get("L_pp", LENGTH))
+    beam = particulars.get("B", length / SLENDERNESS)
+    half, shoulder = beam / 2, length / 2 - 0.25 * length
+    stern = -length / 2
+    points = [(stern, -half), (shoulder, -half), (length / 2, 0.0), (shoulder, half), (stern, half), (stern, -half)]
+    return np.array(points)

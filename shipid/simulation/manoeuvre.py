@@ -25,11 +25,98 @@ from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls
-from shipid.simulation.excitation import aprbs_series, limit_rate
-from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import DEGREE, RPM
-from shipid.vessel.perturb import check_rising
+from shipid.vessel.perturb import check_rising, uniform_draw
 from shipid.vessel.schema import term_blocks
+from shipid.vessel.stability import yaw_growths
+
+STRATA = 8  # strata of the range of levels
+
+
+def aprbs_series(
+    time: Array, *, hold: tuple[float, float], levels: tuple[float, float], key: tuple[object, ...]
+) -> Array:
+    """Amplitude-modulated pseudo-random binary sequence (T,) at times (T,) [s]: levels held for random times.
+
+    Hold times are uniform in `hold` [s]. Of every eight successive levels one lies in each eighth of `levels`, at
+    random (Nelles 2001, Nonlinear System Identification, ch. 17). A longer series begins with the shorter one.
+    """
+    most = int((time[-1] - time[0]) / hold[0]) + 1
+    draws = np.array([uniform_draw(*key, "hold", number) for number in range(most)])
+    ends = time[0] + np.cumsum(hold[0] + (hold[1] - hold[0]) * draws)
+    slack = 1e-9 * max(1.0, float(np.abs(time).max()))  # a level ends at 3 * 0.1 where it should at 0.3
+    number = np.searchsorted(ends, time + slack, side="right")
+    return np.asarray(levels[0] + (levels[1] - levels[0]) * _stratified_draws(int(number[-1]) + 1, key)[number])
+
+
+def limit_rate(series: Array, step: float, rate: float) -> Array:
+    """Rate-limited copy of a series (T,) or (T, S): it changes by at most rate [1/s] * step [s] per sample.
+
+    It starts at the first value and follows the series at full rate until it reaches it, like an actuator with a rate
+    limit.
+    """
+    result = np.array(series, dtype=np.float64)
+    for now in range(1, len(result)):
+        result[now] = result[now - 1] + np.clip(result[now] - result[now - 1], -rate * step, rate * step)
+    return result
+
+
+def _stratified_draws(count: int, key: tuple[object, ...]) -> Array:
+    """Stratified random numbers (count,) in [0, 1): each block of STRATA numbers has one in each equal part."""
+    blocks = range(-(-count // STRATA))
+    order = np.array([[uniform_draw(*key, "order", block, part) for part in range(STRATA)] for block in blocks])
+    within = np.array([[uniform_draw(*key, "level", block, part) for part in range(STRATA)] for block in blocks])
+    return np.asarray(((np.argsort(order, axis=1) + within) / STRATA).ravel()[:count])
+
+
+Side = Literal["starboard", "port"]
+DECAYS, LONGEST = 8.0, 200.0  # until a turn is steady: time constants of a small yaw, and at most ship lengths
+
+
+@dataclass(frozen=True)
+class Request:
+    """Angles, side and times of a standard manoeuvre.
+
+    controls, n, speed : the ship with its commands, shaft speed [rev/s] and speed [m/s] of the approach.
+    angles : those that were given, at most as many as the kind takes, in its units. side : of the first turn.
+    duration : of the log, or of each level of a kind that holds levels [s]; None: the default of the kind.
+    passing : time for one ship length at the speed of the approach [s]. interval : between rows of the log [s].
+    keys : values of the keys that all kinds have: `n_rpm`, `execute_at`, `course_deg`, `approach`.
+    """
+
+    controls: Controls
+    n: float
+    speed: float
+    angles: tuple[float, ...]
+    side: Side
+    duration: float | None
+    passing: float
+    interval: float
+    keys: Mapping[str, Any]
+
+    def angle(self, default: float, place: int = 0) -> float:
+        """The angle at a place of those given, else the default, in the unit of the kind."""
+        return self.angles[place] if place < len(self.angles) else default
+
+    def time(self, lengths: float) -> float:
+        """Length of the log [s]: as asked, else a number of ship lengths after the first order."""
+        return self.keys["execute_at"] + lengths * self.passing if self.duration is None else self.duration
+
+    def settling(self, least: float) -> float:
+        """Ship lengths until a turn is steady, `least` or more: the rate of a nearly neutral ship takes long.
+
+        The time is eight time constants of a small yaw about the straight course of the approach, the slowest of all
+        turns, but at most that for 200 ship lengths.
+        """
+        rates = yaw_growths(self.controls.vessel, self.speed, self.controls.ahead(self.n))
+        decay = min(map(abs, rates)) * self.passing  # in a ship length
+        return float(np.clip(DECAYS / decay if decay > 0 else np.inf, least, LONGEST))
+
+
+def round_to_rows(time: float, interval: float) -> float:
+    """The time [s] in whole intervals, rounded up."""
+    return float(np.ceil(time / interval) * interval)
+
 
 Range = tuple[FiniteFloat, FiniteFloat]
 MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg

@@ -14,6 +14,7 @@ from shipid.measures.criteria import criterion_rows, judge_criteria, measure_row
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.physics.signals import ACTUAL, is_steering, neutral_value, signal_of
+from shipid.report.figure import ship_outline
 from shipid.report.motion import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.perform import perform_manoeuvres
@@ -22,7 +23,6 @@ from shipid.units import RPM
 from shipid.version import __version__
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.outline import ship_outline
 from shipid.vessel.schema import term_blocks
 
 TRIALS: tuple[tuple[str, tuple[float, ...]], ...] = (("turning", (35,)), ("zigzag", (10, 10)), ("zigzag", (20, 20)))

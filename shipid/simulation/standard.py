@@ -12,8 +12,7 @@ from shipid.arguments import as_float_array, check_choice, check_class, check_nu
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls, vessel_service_speed
-from shipid.simulation.manoeuvre import KINDS, MOST_HEADING, MOST_HELM, Trial
-from shipid.simulation.request import Request, Side, round_to_rows
+from shipid.simulation.manoeuvre import KINDS, MOST_HEADING, MOST_HELM, Request, Side, Trial, round_to_rows
 from shipid.units import RPM, plural_word
 from shipid.vessel.load import Vessel
 from shipid.vessel.stability import service_shaft

@@ -25,7 +25,7 @@ from shipid.foundations.function import SimulatorFunction
 from shipid.hybrid.simulated import Simulator
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
-from shipid.plugins import TRIED_FILES
+from shipid.plugins import TRIED_FILES, is_user_code, users_code
 from shipid.simulation.families import expand_families
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
@@ -42,7 +42,6 @@ from shipid.study.declared import (
     named_vessel,
 )
 from shipid.study.schema import Data, Study
-from shipid.users import is_user_code, users_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve_families
 from shipid.vessel.ranges import UNUSUAL

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shipid import document as documents
 from shipid.capacity import excess_memory_words
 from shipid.data.causal import causal_columns
-from shipid.data.checks import copies_of_earlier_runs
+from shipid.data.checks import copies_of_earlier_runs, warn_of_constant_commands
 from shipid.data.dataset import (
     Dataset,
     clock_slack,
@@ -27,7 +27,6 @@ from shipid.data.dataset import (
     stretches_by_run,
     stretches_of_runs,
 )
-from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import (
     Instants,
     PathSource,

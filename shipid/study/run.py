@@ -29,7 +29,7 @@ from shipid.errors import ResultError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal, append_lines, open_journal, whole_lines
-from shipid.plugins import REGISTRIES, add_members, added_members
+from shipid.plugins import REGISTRIES, add_members, added_members, code_digest
 from shipid.study import seals, store
 from shipid.study.cells import (
     NO_ACCURACY,
@@ -53,7 +53,6 @@ from shipid.study.prepare import (
 )
 from shipid.study.seals import PAGES, sole_writer
 from shipid.study.workers import import_for_workers, on_workers
-from shipid.users import code_digest
 from shipid.version import __version__
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share

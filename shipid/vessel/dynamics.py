@@ -20,8 +20,8 @@ from shipid.physics.helm import Helmsman
 from shipid.physics.inertia import added_mass_entries, coriolis_force, mass_matrix, rigid_body_entries
 from shipid.physics.returned import check_returned
 from shipid.physics.signals import rows_of_role, signal_units
+from shipid.plugins import definition_location, is_user_code
 from shipid.units import plural_word
-from shipid.users import definition_location, is_user_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import (
     BEHIND,

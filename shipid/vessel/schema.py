@@ -21,8 +21,8 @@ from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass_entries, rigid_body_entries
 from shipid.physics.signals import SIGNALS, rows_of_role
 from shipid.physics.symbols import argument_types
+from shipid.plugins import definition_location, error_location, locate_errors
 from shipid.units import join_names, unit_fault
-from shipid.users import definition_location, error_location, locate_errors
 from shipid.vessel.ranges import UNUSUAL
 
 FIXED = ("hull", "restoring", "radiation", "waves")  # groups whose members go by the name of their kind, one of each

@@ -16,8 +16,8 @@ from shipid.engine.rollout import rollout
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.observer import MEASURED_MOTION, Estimates, Observer, estimates_at_windows, run_observer
-from shipid.simulation.excitation import aprbs_series
 from shipid.simulation.log import log_columns
+from shipid.simulation.manoeuvre import aprbs_series
 from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.units import DEGREE, RPM
 from shipid.vessel.dynamics import vessel_dynamics

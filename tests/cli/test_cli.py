@@ -1,7 +1,5 @@
 """The command line as a whole: help, mistakes in one line, interruptions, logging."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """`shipid data`."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`shipid identify`: what its options mean; tests/identification/test_command.py runs it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """`shipid predict`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`shipid simulate` and `shipid manoeuvre`."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`shipid study`."""
 
-from __future__ import annotations
-
 import errno
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`shipid vessel`."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -6,8 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.checks import check_dataset, white_noise_of
-from shipid.data.dataset import cumulative_integral
+from shipid.data.checks import (
+    check_dataset,
+    constant_commands,
+    stuck_spans,
+    warn_of_constant_commands,
+    white_noise_of,
+)
+from shipid.data.dataset import Dataset, cumulative_integral
 from tests.drawn import seeds
 from tests.logs.conftest import as_dataset, turning
 
@@ -159,3 +165,106 @@ def test_a_yaw_rate_in_degrees_fails_and_one_with_a_bias_and_noise_passes(seed: 
         assert "range r" not in failed(log.assign(r=read))
         if true.any():
             assert "range r" in failed(log.assign(r=np.degrees(read)))
+
+
+STEP, COUNT, FIRST, LAST = 0.5, 600, 200, 300
+
+
+@pytest.mark.parametrize("name", ["psi", "r", "course", "speed"])
+@pytest.mark.parametrize("seed", seeds(2, 10))
+def test_a_value_that_stays_in_a_turn_is_stuck_and_on_a_straight_course_it_is_not(seed: int, name: str) -> None:
+    random, t = np.random.default_rng(seed), STEP * np.arange(COUNT)
+    for most in (random.uniform(0.5, 1.5), 0.0):  # deg/s
+        r = np.radians(most) * np.sin(t / random.uniform(20.0, 60.0)) + most * 1e-4
+        psi, speed = np.cumsum(r) * STEP, 4.0 + most * np.sin(t / 30.0)
+        velocity = speed * np.exp(1j * psi)
+        seen = {"psi": psi, "r": r, "course": psi, "speed": speed}[name] + random.normal(0.0, 1e-4, COUNT)
+        repeated = np.concatenate([seen[:FIRST], np.full(LAST - FIRST, seen[FIRST]), seen[LAST:]])
+        parts = {"psi": psi, "r": r, "speed": speed}
+        if most and name in parts:
+            parts[name] = repeated
+        pose, rates = (parts["psi"], np.cumsum(velocity) * STEP), (parts["r"], parts["speed"] * np.exp(1j * psi))
+        spans = stuck_spans(name, t, repeated, pose, rates, np.ones(COUNT - 1, dtype=bool))
+        assert spans == ([(FIRST, LAST - 1)] if most else [])
+
+
+N = 200
+HELD = {"rudder.delta": np.full(N, 0.35), "propeller.n": np.full(N, 10.0)}
+
+
+def log(*changes: dict[str, np.ndarray]) -> Dataset:
+    """Runs with one helm and one shaft speed, but for what changes."""
+    motion = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    frames = [
+        pd.DataFrame({"run": f"run {i}", "t": np.arange(float(N)), **motion, **HELD, **change, "flags": 0})
+        for i, change in enumerate(changes)
+    ]
+    return Dataset(pd.concat(frames, ignore_index=True).astype({"run": "str"}), {"clock": "run", "flags": []})
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_commands_that_are_the_same_in_all_runs_are_named(noise: float) -> None:
+    rng = np.random.default_rng(1)
+    noisy = [{name: x + noise * np.abs(x) * rng.standard_normal(N) for name, x in HELD.items()} for _ in range(5)]
+    dataset = log(*noisy)
+    (words,) = warn_of_constant_commands(dataset, dataset.runs)
+    assert set(constant_commands(dataset, dataset.runs)) == set(HELD)
+    assert "rudder.delta" in words
+    assert "are the same in all 5 runs: what they do cannot be learnt" in words
+    assert "is the same" not in words
+    assert "throughout the only run" in warn_of_constant_commands(dataset, ["run 0"])[0]
+
+
+@pytest.mark.parametrize("where", ["one run", "a moment", "between runs"])
+def test_a_command_that_varies_anywhere_varies(where: str) -> None:
+    other = HELD["rudder.delta"].copy()
+    other[slice(60, 65) if where == "a moment" else slice(100, N) if where == "one run" else slice(None)] = -0.1
+    dataset = log({}, {}, {}, {"rudder.delta": other})
+    assert constant_commands(dataset, dataset.runs) == ("propeller.n",)
+    assert warn_of_constant_commands(dataset, dataset.runs) == []
+    assert warn_of_constant_commands(dataset, ["run 0", "run 1"]) != []
+
+
+def one_run(rows: int, step: float = 1.0, **commands: np.ndarray) -> Dataset:
+    """A run of so many rows; names of commands with _ for the point."""
+    columns = {name.replace("_", "."): x for name, x in commands.items()}
+    motion = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)
+    frame = pd.DataFrame({"run": "long", "t": step * np.arange(rows), **motion, **columns, "flags": 0})
+    return Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
+
+
+@pytest.mark.parametrize(
+    ("hours", "step", "lasts", "size", "held"),
+    [
+        (1, 1.0, 20.0, 5.0, False),
+        (1 / 6, 1.0, 5.0, 5.0, False),
+        (10, 1.0, 5.0, 5.0, False),
+        (10, 0.1, 5.0, 5.0, False),
+        (10, 10.0, 10.0, 5.0, False),
+        (1, 1.0, 20.0, 3.0, False),
+        (1, 1.0, 20.0, 1.5, True),
+        (1, 1.0, 1.0, 35.0, True),
+        (1, 0.1, 1.0, 35.0, True),
+        (1 / 6, 1.0, 1.0, 35.0, False),
+    ],
+)
+def test_a_short_kick_in_a_long_run_varies(hours: float, step: float, lasts: float, size: float, held: bool) -> None:
+    """The scatter of a whole run shrinks with its length; what is one faulty row in a thousand is no kick."""
+    rows = round(3600 * hours / step)
+    helm = np.zeros(rows)
+    for begin in (0, rows // 2, rows - round(lasts / step)):
+        moved = helm.copy()
+        moved[begin : begin + round(lasts / step)] = np.radians(size)
+        log = one_run(rows, step, rudder_delta=moved, propeller_n=np.full(rows, 2.0))
+        assert ("rudder.delta" in constant_commands(log, log.runs)) == held
+        assert bool(warn_of_constant_commands(log, log.runs)) == held
+
+
+@pytest.mark.parametrize(("angle", "share", "held"), [(0.4, 0.008, True), (0.65, 0.013, False)])
+def test_noise_of_feedback_is_no_order(angle: float, share: float, held: bool) -> None:
+    """Standard deviations of 0.5 deg and of 1 % count as none, in a run of any length."""
+    rng = np.random.default_rng(2)
+    for rows in (100, 100_000):
+        helm = 0.1 + np.radians(angle) * rng.standard_normal(rows)
+        log = one_run(rows, rudder_delta=helm, propeller_n=2.0 * (1 + share * rng.standard_normal(rows)))
+        assert constant_commands(log, log.runs) == (("rudder.delta", "propeller.n") if held else ())

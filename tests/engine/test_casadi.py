@@ -1,7 +1,5 @@
 """The CasADi engine: actuator states along recorded orders."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipid.engine.casadi import BLOCK, evaluate_samples, memory_along

@@ -1,7 +1,5 @@
 """The integrator: order of accuracy of Euler and RK4, and exact memories."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

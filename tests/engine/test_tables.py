@@ -1,7 +1,5 @@
 """Tables: found in functions, and looked up in C with the values of their ramps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ import pytest
 from shipid.engine import native
 from shipid.engine.integrate import RolloutBatch, RolloutJob
 from shipid.engine.native import compiler_target, find_compiler, run_native
-from shipid.engine.tables import LEAST, TableLookup, even_tables, find_tables
+from shipid.engine.tables import LEAST, InstructionGraph, TableLookup, apply_operation, even_tables, find_tables
 from shipid.engine.vectors import DOUBLE, SINGLE, CompilerTarget
 from shipid.physics.wind import interpolate_ramps
 from shipid.vessel import dynamics as module
@@ -117,3 +115,20 @@ def test_the_source_of_a_ship_with_tables_looks_them_up() -> None:
     assert len(tables) == 3
     assert source.count("v_value(&") == 3
     assert source.count("v_place(a") == 1
+
+
+def test_operands_are_the_instructions_that_compute_them() -> None:
+    """Evaluated instruction by instruction, the graph gives what the function gives."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    function = ca.Function("f", [x, y], [ca.fmax(x * y, 2.0) - ca.sin(x) / y + x * y])
+    graph, values, given = InstructionGraph(function), {}, (0.7, 3.1)
+    for k, (operation, operands) in enumerate(zip(graph.operation, graph.operands, strict=True)):
+        if operation == ca.OP_INPUT:
+            values[k] = ca.SX(given[function.instruction_input(k)[0]])
+        elif operation == ca.OP_CONST:
+            values[k] = ca.SX(function.instruction_constant(k))
+        elif operation == ca.OP_OUTPUT:
+            result = values[operands[0]]
+        else:
+            values[k] = apply_operation(operation, [values[i] for i in operands])
+    assert float(result) == float(function(*given))

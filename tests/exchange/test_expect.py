@@ -1,7 +1,5 @@
 """What to expect before there are data, and with more runs than a study has."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,15 +9,14 @@ import pytest
 from shipid import read_results
 from shipid.errors import ShipidError
 from shipid.exchange import expect
-from shipid.exchange.law import CELL_COLUMNS, UnseenShip, check_cells, fit_law
-from tests.exchange.drawn_cells import draw_cells
+from shipid.exchange.law import CELL_COLUMNS, UnseenShip, check_cells, read_law
 
 SHIP = UnseenShip(100.0, 7.0, baseline=50.0, floor=12.0)
 
 
 @pytest.fixture(scope="module")
 def law():
-    return fit_law(draw_cells(9, 5, ("nominal", "damping", "moderate", "high", "template", "sister", "none")))
+    return read_law()
 
 
 def test_better_physics_and_more_runs_are_expected_to_err_less(law):

@@ -1,27 +1,75 @@
 """The law of exchange: it finds the law that cells are drawn from, and its intervals hold on ships not seen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from shipid.errors import ResultError, ShipidError
+from docs.exchange_fit import FLOOR_CENTRE, fit_hierarchy, fit_law, prior_of, save_law, ship_designs
+from shipid.errors import DataError, ResultError, ShipidError
 from shipid.exchange.law import (
+    CELL_COLUMNS,
     RESPONSES,
     SEAS,
+    Hierarchy,
     UnseenShip,
-    fit_hierarchy,
-    fit_law,
-    prior_of,
+    check_cells,
     read_law,
     response_rows,
     response_values,
-    save_law,
-    ship_designs,
 )
-from tests.exchange.drawn_cells import TRUE_SPREAD, TRUE_THETA, draw_cells, true_law
+from shipid.units import GRAVITY
+
+AMOUNTS, HORIZONS = (1, 2, 4, 8, 16, 32, 64), (1.0, 2.0, 4.0)
+TRUE_THETA = {
+    "1": -1.5, "n": -0.4, "a": 0.8, "a:n": -0.1, "h": 0.1, "damping": 0.2, "mass": -0.2,
+}  # fmt: skip
+TRUE_SPREAD = {
+    ("ship", "1"): 0.2, ("ship", "n"): 0.08, ("ship foundation", "1"): 0.1, ("ship N_D", "few"): 0.2,
+    ("ship foundation N_D", "1"): 0.1, ("ship foundation N_D ahead", "1"): 0.05,
+}  # fmt: skip
+
+
+def true_law() -> Hierarchy:
+    """The law of H that the cells are drawn from: nothing of it is unknown."""
+    form = RESPONSES["H"]
+    floor = {**FLOOR_CENTRE, "n": -0.1, "none": 0.5, "none:n": -0.2}
+    theta = np.array(
+        [*(TRUE_THETA.get(name, 0.0) for name in form.features), *(floor.get(name, 0.0) for name in form.floor)]
+    )
+    variances = np.array([TRUE_SPREAD.get(level, 0.0) ** 2 for level in form.levels])
+    return Hierarchy(form, theta, np.zeros((len(theta),) * 2), variances, 1000)
+
+
+def draw_cells(ships: int, seed: int, kinds: tuple[str, ...]) -> pd.DataFrame:
+    """Cells of some ships; effects and rest of H are those of `true_law`."""
+    rng, law, frames = np.random.default_rng(seed), true_law(), []
+    for number in range(ships):
+        length, froude = np.exp(rng.uniform(np.log(2), np.log(320))), rng.uniform(0.1, 0.35)
+        size = {"length": length, "froude": froude, "speed": froude * np.sqrt(GRAVITY * length)}
+        base = np.exp(rng.normal(-2, 0.2))
+        floor = base * np.exp(rng.normal(-1.5, 0.4))
+        scatter = {ahead: np.exp(rng.normal(0, 0.03, 2)) for ahead in HORIZONS}
+        rows = [
+            {
+                "ship": f"ship-{number}", "type": f"type-{number % 8}", "bundled": number % 5 == 0, **size,
+                "foundation": f"{kind}-{place}", "kind": kind,
+                "A": np.nan if kind == "none" else length * ahead**1.5 * np.hypot(error * (kind != "nominal"), floor),
+                "N_D": amount, "ahead": ahead, "H": 1.0, "baseline": length * base * ahead**1.6 * scatter[ahead][0],
+                "floor": length * floor * ahead**1.5 * scatter[ahead][1],
+            }
+            for place, kind in enumerate(kinds)
+            for error in [base * np.exp(rng.normal(-0.3, 0.6))]
+            for amount in AMOUNTS
+            for ahead in HORIZONS
+        ]  # fmt: skip
+        part = pd.DataFrame(rows)
+        mean, jacobian = law.mean(part)
+        root = np.linalg.cholesky(law.spread(part, jacobian) + 1e-12 * np.eye(len(part)))
+        frames.append(part.assign(H=part["baseline"] * np.exp(mean + root @ rng.standard_normal(len(part)))))
+    return pd.concat(frames, ignore_index=True)[[*CELL_COLUMNS]]
+
 
 KINDS = ("nominal", "damping", "mass", "thrust", "moderate", "high", "none")
 
@@ -214,3 +262,25 @@ def test_what_was_seen_of_a_ship_tells_of_its_floor(law):
     before, after = np.mean(misses, axis=0)
     assert after < 0.6 * before
     assert np.mean(inside) > 0.8
+
+
+def test_cells_that_diverged_are_left_out(cells):
+    wild = cells.assign(H=cells["H"].where(cells["N_D"] > 1, np.nan))
+    assert set(check_cells(wild)["N_D"]) == {2, 4, 8, 16, 32, 64}
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"kind": "guess"}, "kind: 'guess' is no kind: give one of nominal, "),
+        ({"baseline": 0.0}, "baseline: 0 is not above 0"),
+        ({"A": -1.0}, "A: -1 is not above 0"),
+        ({"H": 0.0}, "H: 0 is not above 0"),
+        ({"floors": 1.0}, "floor: missing: a table of cells has the columns ship, type"),
+    ],
+)
+def test_a_wrong_value_is_one_line(cells, changed, words):
+    cells = cells.drop(columns="floor") if "floors" in changed else cells
+    with pytest.raises(DataError) as error:
+        check_cells(cells.assign(**changed))
+    assert words in str(error.value)

@@ -1,17 +1,31 @@
-"""Drawn ships: the same by any order, inside their ranges, course-keeping as a ship's, and none of the template's."""
+"""Ships whose cells teach the law: the same in any order, none of the template, each cell once; a start resumes."""
 
-from __future__ import annotations
+import sys
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from shipid.exchange.ships import SHIP_TYPES, Dice, DrawnShip, _linear_derivatives, draw_ship
+from docs import exchange_ships
+from docs.exchange_ships import (
+    BUNDLED,
+    HORIZONS,
+    SHIP_TYPES,
+    Dice,
+    DrawnShip,
+    _linear_derivatives,
+    draw_ship,
+    plan_ship,
+    ship_names,
+    studied_ship,
+    study_ship,
+)
+from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls
-from shipid.simulation.manoeuvre import ConstantOrders
-from shipid.simulation.perform import perform_manoeuvres
-from shipid.vessel.stability import service_shaft
 from shipid.vessel.template import Particulars, first_guess
 
+DRAWN, AMOUNTS = 10, (1, 2)
 SEED = 611  # no record has it
 
 
@@ -46,30 +60,6 @@ def test_every_type_is_drawn_within_its_ranges(fleet: list[DrawnShip]) -> None:
         )
 
 
-def test_a_ship_turns_to_the_side_of_its_helm_and_loses_speed(fleet: list[DrawnShip]) -> None:
-    for ship in fleet:
-        vessel, given = ship.vessel(), ship.particulars
-        controls, rpm, passing = Controls(vessel), given.rpm, given.length / given.service
-        turns = []
-        for side in (1.0, -1.0):
-            if controls.differential:
-                orders = {"port.n_rpm": rpm * (0.85 + 0.15 * side), "starboard.n_rpm": rpm * (0.85 - 0.15 * side)}
-            else:
-                name, sign = next(iter(controls.helm.items()))
-                orders = {"n_rpm": rpm, f"{name.rpartition('.')[2]}_deg": 10 * side * sign}
-            turns.append(ConstantOrders(orders=orders, duration=15 * passing, start_speed=given.service))
-        end = perform_manoeuvres(vessel, turns, step=passing / 50).groupby("run").last()
-        assert (np.sign(end["r"]) == [1, -1]).all(), ship
-        assert (end["u"] < given.service).all(), ship
-
-
-def test_the_shaft_speed_of_the_particulars_holds_the_service_speed(fleet: list[DrawnShip]) -> None:
-    for ship in fleet:
-        given, vessel = ship.particulars, ship.vessel()
-        n = service_shaft(vessel, given.service)
-        assert given.rpm == pytest.approx(60 * float(n or 0))
-
-
 def test_the_truth_is_not_what_the_template_gives(fleet: list[DrawnShip]) -> None:
     """Same commands, so that one log fits both; no hull number of the one is in the other, and the paths part."""
     for ship in fleet:
@@ -99,3 +89,60 @@ def test_dice_of_another_name_change_no_draw() -> None:
     factors = [Dice((k,)).scatter("x", 0.25) for k in range(400)]
     assert 0.8 <= min(factors) < 0.82 < 1.22 < max(factors) <= 1.25
     assert abs(np.log(factors).mean()) < 0.02
+
+
+def test_every_ship_is_named_once_and_a_part_is_mixed() -> None:
+    names = ship_names()
+    assert len(names) == len(set(names)) == len(BUNDLED) + 30
+    assert 1 < sum(name in BUNDLED for name in names[:8]) < 5
+
+
+@pytest.mark.parametrize("name", ["drawn-01", "drawn-03", "kvlcc2-l7"])
+def test_the_study_of_a_ship_has_its_own_sizes(name: str) -> None:
+    ship = studied_ship(name, SEED, DRAWN)
+    plan = plan_ship(ship, SEED, DRAWN, AMOUNTS)
+    truth, ahead = plan.study.truth, plan.study.prediction
+    U, L = ship.physics.document["particulars"]["U_0"], ship.physics.length
+    assert ahead.ahead * 0.75 * U / L == pytest.approx(max(HORIZONS), rel=0.05)
+    assert ahead.horizon % 4 == 0
+    assert truth.current_speed[1] <= 0.051 * U
+    assert 0.0001 * U < truth.sensors["u"].noise < 0.0101 * U
+    assert {one.kind for one in truth.manoeuvre} >= {"turning", "steps"}
+    assert {one.family.partition("-")[0] for one in plan.foundations} == {
+        *("nominal", "damping", "mass", "thrust", "missing", "moderate", "high", "template", "none"),
+        *(["sister"] if name != "drawn-01" else []),  # the only one of ten ships that steers by its shafts
+    }
+
+
+@pytest.mark.slow
+def test_the_table_has_each_cell_once_and_its_columns_agree() -> None:
+    cells = study_ship("drawn-01", SEED, DRAWN, AMOUNTS)
+    assert not cells.duplicated(["ship", "foundation", "N_D", "ahead"]).any()
+    alone = cells[cells["N_D"] == 0]
+    assert (alone["H"] == alone["A"]).all()
+    assert (cells["kind"] == "none").equals(cells["A"].isna())
+    nominal = cells[cells["kind"] == "nominal"]
+    assert (nominal["A"] == nominal["floor"]).all()
+    assert (cells.groupby("ahead")[["baseline", "floor"]].nunique() == 1).all(axis=None)
+    wide = cells.pivot_table(index=["foundation", "N_D"], columns="ahead", values="H")
+    assert (wide[4.0] > wide[1.0]).all()  # paths part with time
+
+
+def test_a_start_goes_on_and_a_ship_that_fails_is_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    studied = []
+
+    def study(name: str, *_: object) -> pd.DataFrame:
+        studied.append(name)
+        if name == "otter":
+            raise ShipidError("it capsizes")
+        return pd.DataFrame({"ship": [name], "H": [1.0]})
+
+    monkeypatch.setattr(exchange_ships, "study_ship", study)
+    for words in (["--ships", "mariner"], []):
+        monkeypatch.setattr(sys, "argv", ["", str(tmp_path), *words, "--drawn", "10", "--workers", "0"])
+        exchange_ships.main()
+    assert sorted(studied) == sorted(ship_names(10))
+    assert "otter: left out, it capsizes" in capsys.readouterr().out
+    assert sorted(pd.read_csv(tmp_path / "cells.csv")["ship"]) == sorted({*studied} - {"otter"})

@@ -1,7 +1,5 @@
 """ONNX: the networks alone, in both precisions."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rows of the campaign and how many trials each has: what the product must survive, and how the fault is made."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable
@@ -49,7 +47,6 @@ ROWS: dict[str, Row] = {
     "user": Row(folders.another_user, 200, "files of another user, or read only", 200.0),
     "clock": Row(folders.clocks, 200, "the time jumps, files are of the future", 200.0),
     "version": Row(folders.another_version, 500, "keys of another version, sealed", 60.0),
-    "ships": Row(folders.ships, 500, "SIGKILL, and files changed", 60.0),
     "exported": Row(documents.sanitized, 60, "sanitizers of gcc and clang", 120.0),
     "options": Row(documents.options, 500, "of expect and vessel similar"),
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),

@@ -1,7 +1,5 @@
 """Rows of the campaign: mutated documents, read and used as a user would."""
 
-from __future__ import annotations
-
 import random
 import re
 import resource
@@ -16,7 +14,6 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
-from shipid.exchange.ships import draw_ship
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
 from shipid.export.model import build_model
@@ -27,6 +24,7 @@ from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
+from tests.drawn_ships import drawn_ship
 from tests.export.compiled import SANITIZERS, run_example
 from tests.export.strange import KINDS, drawn
 from tests.faults.mutations import mutated
@@ -84,7 +82,7 @@ def sanitized(seed: int) -> None:
     most = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (most, most))  # sanitizers reserve terabytes
     if seed % 2:
-        files = vessel_files(draw_ship(seed, 0).vessel(), "ship", rng.choice(["rk4", "euler"]))
+        files = vessel_files(drawn_ship(seed), "ship", rng.choice(["rk4", "euler"]))
     else:
         draws = (drawn(rng.choice(KINDS), rng.randrange(10**6)) for _ in range(100))
         files = predictor_files(

@@ -1,7 +1,5 @@
 """Rows of the campaign: folders of results that are killed, filled up, shared and damaged, and then continued."""
 
-from __future__ import annotations
-
 import atexit
 import errno
 import io
@@ -22,13 +20,11 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-import pandas as pd
 import pyarrow.parquet
 
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import read_dataset
 from shipid.errors import ShipidError
-from shipid.exchange import campaign as ships_study
 from shipid.files import TEMPORARY
 from shipid.predictor import Predictor
 from shipid.study import seals
@@ -455,42 +451,6 @@ def _other_keys(file: Path, rng: random.Random) -> str:
         break
     file.write_text(json.dumps(content))
     return f"{file.name}: {key} {kind}"
-
-
-def ships(seed: int) -> None:
-    """The study over ships, each ship a small table, killed and its files damaged: every ship once, or one line."""
-    rng = random.Random(f"ships {seed}")
-
-    def study(name: str, *_: Any) -> pd.DataFrame:
-        if name == "otter":
-            raise ShipidError("cannot be studied")
-        return pd.DataFrame({"ship": [name], "H": [float(len(name))]})
-
-    def run(at: int) -> None:
-        with patch.object(ships_study, "study_ship", study):
-            _killed_at(at, lambda: list(ships_study.run_ships(place / "run", 0, 3)))
-
-    with a_place() as place:
-        child(lambda: run(10**6))
-        wanted = pd.read_csv(place / "run" / "cells.csv")
-        shutil.rmtree(place / "run")
-        words = []
-        for _ in range(rng.choice([1, 2])):
-            at = rng.randrange(150)
-            words.append(f"killed at call {at}")
-            child(lambda at=at: run(at))  # type: ignore[misc]
-        if rng.random() < 0.6 and any((place / "run").glob("**/*.*")):
-            words.append(_damage(place / "run", rng))
-        code = child(lambda: run(10**6))
-        if code:
-            raise Failure("traceback", *words) if code == 2 else ShipidError("refused")
-        found = pd.read_csv(place / "run" / "cells.csv")
-        if (
-            not found.sort_values("ship")
-            .reset_index(drop=True)
-            .equals(wanted.sort_values("ship").reset_index(drop=True))
-        ):
-            raise Failure("mixed", *words)
 
 
 def two_plans(seed: int) -> None:

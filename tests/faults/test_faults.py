@@ -1,7 +1,5 @@
 """A few seconds of the campaign of faults; `make faults` runs more of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -28,7 +26,6 @@ QUICK = {
     "function": 6,
     "predictions": 6,
     "package": 3,
-    "ships": 6,
     "options": 10,
     "damaged": 4,
     "killed": 3,

@@ -1,7 +1,5 @@
 """FMUs of others give the motion of the same ship in NumPy; of shipid's own, that of the vessel."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 from pathlib import Path

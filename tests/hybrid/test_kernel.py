@@ -1,7 +1,5 @@
 """Kernel ridge regression as plain NumPy writes it; port and starboard are alike."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,6 @@ from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, run_observer
 from shipid.study.prepare import at_instants
 from shipid.vessel.load import load_vessel
-from tests.hybrid.mirror import mirrored
 from tests.hybrid.tasks import (
     FOLDS,
     RUDDER,
@@ -29,6 +26,31 @@ from tests.hybrid.tasks import (
     tune,
 )
 from tests.study.test_whole import windy
+
+SIDES = {"port": "starboard", "starboard": "port"}
+ODD = (
+    "east",
+    "psi",
+    "phi",
+    "v",
+    "r",
+    "p",
+    "beta_w",
+    "alpha",
+    "delta",
+)  # change sign; written apart from the table of signals
+
+
+def mirrored(dataset: Dataset) -> Dataset:
+    """The same runs as a mirror shows them: east is west, port is starboard."""
+    columns = {}
+    for name in map(str, dataset.frame.columns):
+        component, dot, signal = name.rpartition(".")
+        image = f"{SIDES.get(component, component)}{dot}{signal}"
+        columns[image] = -dataset.frame[name] if signal in ODD else dataset.frame[name]
+    frame = dataset.frame.assign(**columns)
+    return Dataset(frame, dataset.metadata)
+
 
 SMALL = Kernel(trials=1, steps=6, terms=4)
 MEMORY = Memory(history=(2.0, 4.0), turned=6.0, positions=(1.0, 5.0), error=(3.0, 6.0), observer=True)  # type: ignore[arg-type]

@@ -1,7 +1,5 @@
 """Fitted objects: what is stored says what was, and what is damaged is refused."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

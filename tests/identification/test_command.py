@@ -1,7 +1,5 @@
 """`shipid identify`: what it prints and writes, and that a mistake is one line which writes nothing."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

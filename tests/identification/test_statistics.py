@@ -1,7 +1,5 @@
 """Statistics of a fit: intervals cover, what is not identified is named, nothing depends on units or order."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -11,18 +9,22 @@ from scipy import stats
 
 from shipid.errors import ShipidError
 from shipid.identification.statistics import (
+    MOST_COLLINEAR,
     Basis,
     LinearFit,
     _Drift,
     _signal_drift,
     against_priors,
     block_clusters,
+    collinear_sets,
     factors_of_single_runs,
     fit_statistics,
+    invert_information,
     open_to_drift,
     pooled_autocorrelation,
     residual_whiteness,
 )
+from tests.drawn import seeds
 from tests.identification.linear import SIGNALS, design, fitted, labels, linear_fit, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
@@ -449,3 +451,81 @@ def test_nothing_is_called_identified_whose_interval_holds_no_effect(seed: int) 
         assert (" is not identified: " in sentence) != known
         assert re.search(r"\+-[\d.]+ m/s" if centre == 0 else r"\+-[\d.]+ % of its base value", sentence)
         assert "scale" not in sentence
+
+
+RNG = np.random.default_rng(0)
+FREE = np.linalg.qr(RNG.normal(size=(200, 6)))[0]
+
+
+def correlated(cosine: float) -> np.ndarray:
+    """Two columns at an angle of this cosine."""
+    return np.stack([FREE[:, 0], cosine * FREE[:, 0] + np.sqrt(1 - cosine**2) * FREE[:, 1]], axis=1)
+
+
+@pytest.mark.parametrize("cosine", [0.996, 0.9999])
+def test_index_of_two_columns_is_known(cosine: float) -> None:
+    """gamma = 1 / sqrt(1 - cosine) (Brun et al. 2001, eq. 10)."""
+    (pair,) = collinear_sets(correlated(cosine), "ab")
+    assert pair.gamma == pytest.approx(1 / np.sqrt(1 - cosine))
+
+
+def test_a_set_has_an_index_above_the_limit() -> None:
+    """gamma = 15 at a cosine of 1 - 1 / 225."""
+    limit = 1 - 1 / MOST_COLLINEAR**2
+    assert collinear_sets(correlated(limit - 1e-5), "ab") == ()
+    assert len(collinear_sets(correlated(limit + 1e-5), "ab")) == 1
+
+
+def test_nothing_depends_on_units() -> None:
+    """b = a, and c has no effect: the weights of the set are those of the factors."""
+    jacobian = np.column_stack([correlated(0.9999), np.zeros(200), FREE[:, 2]])
+    scale = np.array([0.01, 30.0, 1.0, 100.0])
+    for one, other in zip(collinear_sets(jacobian, "abcd"), collinear_sets(jacobian * scale, "abcd"), strict=True):
+        assert one.names == other.names
+        assert one.gamma == pytest.approx(other.gamma, rel=1e-6)
+        if len(one.names) == 2:
+            ratio = np.array(other.weights) / one.weights
+            assert ratio[1] / ratio[0] == pytest.approx(0.01 / 30.0)
+
+
+def test_the_weights_move_the_residuals_as_little_as_the_index_says() -> None:
+    jacobian = correlated(0.999) * np.array([1.0, 20.0])
+    (pair,) = collinear_sets(jacobian, "ab")
+    moved = np.array(pair.weights)
+    seen = np.linalg.norm(jacobian @ moved) / np.linalg.norm(moved * [1.0, 20.0])
+    assert seen == pytest.approx(1 / pair.gamma)
+
+
+def test_sets_are_as_small_as_they_can_be() -> None:
+    """b = a, and e = c + d / 2: two sets, and f in neither."""
+    a, c, d, f = FREE[:, :4].T
+    jacobian = np.stack([a, a + 1e-4 * FREE[:, 4], c, d, c + 0.5 * d + 1e-4 * FREE[:, 5], f], axis=1)
+    sets = collinear_sets(jacobian, "abcdef")
+    assert {entry.paths for entry in sets} == {("a", "b"), ("c", "d", "e")}
+    three = next(entry for entry in sets if len(entry.paths) == 3)
+    weights = np.array(three.weights) / three.weights[2]
+    np.testing.assert_allclose(weights, [-1, -0.5, 1], atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 5))
+def test_of_seen_directions_it_is_the_inverse(seed: int) -> None:
+    """Parameters of very different size too: an information matrix in mixed units."""
+    rng = np.random.default_rng(seed)
+    J = rng.normal(size=(30, 5)) * 10.0 ** rng.uniform(-6, 6, 5)
+    inverse, silent = invert_information(J.T @ J)
+    scale = np.sqrt(np.diag(J.T @ J))
+    np.testing.assert_allclose(
+        inverse * np.outer(scale, scale), np.linalg.inv((J / scale).T @ (J / scale)), rtol=1e-6, atol=1e-9
+    )
+    assert not silent.any()
+
+
+def test_parameters_along_a_direction_without_data_are_named() -> None:
+    """The first two act together, the last not at all; the third is known as if it were alone."""
+    J = np.zeros((20, 4))
+    J[:, 0] = J[:, 1] = np.linspace(-1, 1, 20)
+    J[:, 2] = 2.0
+    inverse, silent = invert_information(J.T @ J)
+    assert silent.tolist() == [True, True, False, True]
+    assert inverse[2, 2] == pytest.approx(1 / (20 * 4.0))
+    assert np.isfinite(inverse).all()

@@ -1,7 +1,5 @@
 """Instants between samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

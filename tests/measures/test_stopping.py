@@ -1,7 +1,5 @@
 """A stop at constant deceleration on a slowly turning heading."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import casadi as ca
 import pytest
 

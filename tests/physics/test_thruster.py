@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import tomllib
 from functools import partial
 from pathlib import Path

@@ -7,16 +7,19 @@ import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from plotly.offline import get_plotlyjs_version
 
 from shipid.report import AnswerSentence, ReportContent, write_report
 from shipid.report.figure import PageFigure
-from shipid.report.page import render_page
+from shipid.report.page import MEANINGS, Section, draw_sections, mark_short_names, render_page
 from shipid.report.paths import window_data
 from shipid.report.sections import SECTIONS
+from shipid.report.tables import PageTable
 from tests.report.views import views
 
 NASTY = "<script>alert('x')</script>"
@@ -270,3 +273,50 @@ def test_write_report(tmp_path, plain):
     assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
     with pytest.raises(FileExistsError):
         write_report(plain, file / "report.html")
+
+
+def without_tags(text: str) -> str:
+    return re.sub(r"<[^>]*>", "", text)
+
+
+@pytest.mark.parametrize("name", MEANINGS)
+def test_every_short_name_is_explained(name: str) -> None:
+    assert f">{name}</abbr>" in mark_short_names(f"its {name} = 3")
+
+
+def test_words_are_left_alone() -> None:
+    assert mark_short_names("A model and H-shaped bars at N_Dx") == "A model and H-shaped bars at N_Dx"
+    assert mark_short_names("A model of 3 m").count("abbr") == 0
+
+
+def test_no_text_becomes_a_tag() -> None:
+    markup = mark_short_names('<b onclick="x">H_90</b> & more')
+    assert "<b" not in markup
+    assert without_tags(markup) == "&lt;b onclick=&#34;x&#34;&gt;H_90&lt;/b&gt; &amp; more"
+
+
+EMPTY = pd.DataFrame()
+FULL = pd.DataFrame({"a": [1.0]})
+
+
+def table(name: str) -> PageTable:
+    return PageTable(name, name, "", ["a"], [True], [])
+
+
+@pytest.mark.parametrize(("need", "shown"), [("full", True), ("empty", False), ("absent", False), ("number", True)])
+def test_a_section_needs_its_parts(need, shown):
+    content = SimpleNamespace(full=FULL, empty=EMPTY, number=0.0)
+    section = Section("A", {"a": (lambda _: table("a"), need)})
+    assert [one.id for one in draw_sections({"a": section}, content)] == ["a"] * shown
+
+
+def test_order_and_gaps():
+    sections = {
+        "b": Section("B", {"none": (lambda _: None, ""), "b": (lambda _: table("b"), "")}),
+        "none": Section("Nothing", {"nothing": (lambda _: None, "")}),
+        "a": Section("A", {"a": (lambda _: table("a"), "")}),
+    }
+    assert [(one.id, one.title, [i.id for i in one.items]) for one in draw_sections(sections, None)] == [
+        ("b", "B", ["b"]),
+        ("a", "A", ["a"]),
+    ]

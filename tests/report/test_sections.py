@@ -9,11 +9,11 @@ from shipid.report import ReportContent, identification, logs, motion
 from shipid.report.page import OF_EVERY_PAGE, Section, draw_sections, render_page
 from shipid.report.sections import SECTIONS
 from tests.documented import module
-from tests.report import test_checks, test_identification, test_motion
+from tests.report import test_identification, test_logs, test_motion
 
 PAGES = {
     "study": (SECTIONS, None),
-    "check": (logs.CHECK_PAGE, lambda: test_checks.content("log")),
+    "check": (logs.CHECK_PAGE, lambda: test_logs.content("log")),
     "identification": (identification.IDENTIFICATION_PAGE, test_identification.content),
     "manoeuvre": (motion.MANOEUVRE_PAGE, lambda: test_motion.content("spiral")),
 }

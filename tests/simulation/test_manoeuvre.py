@@ -1,7 +1,6 @@
 """Manoeuvres do what the field means by them, on a ship whose turns are known."""
 
-from __future__ import annotations
-
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -9,20 +8,27 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
 from shipid.measures.recognise import record_of
 from shipid.measures.zigzag import zigzag_measures
+from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import (
     KINDS,
     CrashStop,
     Excitation,
     Manoeuvre,
+    Request,
     Spiral,
     StepManoeuvre,
     TurningCircle,
     Zigzag,
+    aprbs_series,
+    limit_rate,
+    round_to_rows,
 )
 from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.truth import ManoeuvreDraw, Truth, check_truth, draw_manoeuvres, simulate_truth
 from shipid.units import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
@@ -197,3 +203,177 @@ def test_excitation_moves_within_its_limits() -> None:
 def test_impossible_blocks_are_refused(kind: str, block: dict[str, Any]) -> None:
     with pytest.raises(DocumentError):
         KINDS[kind](**block)
+
+
+def steps(**changes: Any) -> np.ndarray:
+    return aprbs_series(
+        np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes}
+    )
+
+
+def test_a_longer_series_begins_with_the_shorter() -> None:
+    time = np.arange(5001) * 0.1
+    short = aprbs_series(time[:1001], hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))
+    np.testing.assert_array_equal(aprbs_series(time, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
+    np.testing.assert_array_equal(
+        aprbs_series(time + 40.0, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short
+    )
+    assert not np.isin(short, steps(key=(7, 2))).any()
+
+
+def test_rate_limit_is_respected_and_caught_up_with() -> None:
+    ordered = np.stack([steps(), steps(key=(7, 2))], axis=1)
+    executed = limit_rate(ordered, 0.1, 0.5)
+    assert np.abs(np.diff(executed, axis=0)).max() <= 0.05 * (1 + 1e-9)
+    np.testing.assert_array_equal(limit_rate(ordered[:, 0], 0.1, 0.5), executed[:, 0])
+    assert executed.min() >= ordered.min()
+    assert executed.max() <= ordered.max()
+    assert np.mean(np.isclose(executed, ordered)) > 0.8  # 0.8 units at most take 1.6 s of holds of 4 s and more
+    ends = np.flatnonzero(np.diff(ordered[:, 0]) != 0)
+    np.testing.assert_allclose(executed[ends, 0], ordered[ends, 0])
+
+
+def test_levels_fill_their_range_evenly() -> None:
+    series = steps()
+    levels = series[np.concatenate([[0], np.flatnonzero(np.diff(series) != 0) + 1])]
+    assert levels.min() >= -0.5
+    assert levels.max() < 0.3
+    eighth = np.floor((levels + 0.5) / 0.1).astype(int)
+    for first in range(0, len(levels) - 8, 8):
+        assert sorted(eighth[first : first + 8]) == list(range(8))
+    assert len({tuple(eighth[first : first + 8]) for first in range(0, 80, 8)}) > 5  # in another order each time
+
+
+KEYS = {"n_rpm": 120.0, "execute_at": 10.0, "course_deg": 0.0, "approach": "steady"}
+ASKED = Request(Controls(load_vessel("gunnerus-28.9")), 2.0, 3.0, (15.0,), "port", None, 8.0, 0.5, KEYS)
+
+
+def test_times_are_in_ship_lengths_unless_they_are_given() -> None:
+    """A log has what goes by before the first order, too."""
+    assert (ASKED.time(30), replace(ASKED, duration=70.0).time(30)) == (250.0, 70.0)
+
+
+def test_rows_are_whole() -> None:
+    assert [round_to_rows(time, ASKED.interval) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
+
+
+def test_a_turn_settles_in_time_constants_of_the_ship_within_limits() -> None:
+    """The number of lengths is that of the ship between 0 and 200; never less than asked."""
+    lengths = ASKED.settling(0.0)
+    assert 0 < lengths < 200
+    assert ASKED.settling(150.0) == pytest.approx(max(150.0, lengths))
+    assert replace(ASKED, passing=1e-6).settling(0.0) == 200.0
+
+
+SHIP = load_vessel("gunnerus-28.9")
+LAGGED = SHIP.with_values({f"thruster.{side}.actuator": LAG for side in ("port", "starboard")})
+SHAFT = {"n_rpm": [80.0, 150.0]}
+BLOCKS: dict[str, dict[str, Any]] = {
+    "turning": {**SHAFT, "alpha_deg": [-40.0, 40.0], "start_speed": [0.0, 2.0]},
+    "steps": {**SHAFT, "alpha_deg": [-40.0, 40.0], "hold": [2.0, 6.0]},
+    "turning_circle": {**SHAFT, "angle_deg": [10.0, 35.0], "side": ["starboard", "port"]},
+    "pull_out": {**SHAFT, "turn": [5.0, 10.0]},
+    "zigzag": {**SHAFT, "angle_deg": [10.0, 30.0], "side": ["starboard", "port"], "approach": "rest"},
+    "spiral": {**SHAFT, "hold": 4.0, "angles_deg": [20.0, -20.0, 5.0]},
+    "crash_stop": {**SHAFT, "astern_rpm": [50.0, 100.0], "execute_at": [0.0, 5.0]},
+    "excitation": {**SHAFT, "angle_deg": 15.0, "hold": [2.0, 6.0]},
+}
+
+
+def truth(*blocks: dict[str, Any], **changes: Any) -> Truth:
+    given = {"vessel": "gunnerus-28.9", "manoeuvres": 3, "duration": 20.0, "step": 0.1, "seed": 5}
+    return Truth(**{**given, "manoeuvre": list(blocks), **changes})
+
+
+def test_every_kind_has_an_example() -> None:
+    assert set(BLOCKS) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", list(BLOCKS))
+def test_every_kind_is_a_truth(kind: str) -> None:
+    """A dataset, each run as long as run-up and duration say, no two runs alike; more runs change none that exist."""
+    block = {"kind": kind, **BLOCKS[kind]}
+    few = simulate_truth(truth(block, manoeuvres=2, run_up=5.0), LAGGED)
+    many = simulate_truth(truth(block, manoeuvres=4, run_up=5.0), LAGGED)
+    pd.testing.assert_frame_equal(many.iloc[: len(few)], few, rtol=1e-9, atol=1e-9)
+    runs = [run for _, run in many.groupby("run")]
+    assert len(Dataset(many, {"clock": "run", "flags": []}).frame) == 4 * 26
+    for run in runs:
+        np.testing.assert_allclose(run["t"], np.arange(26.0))
+    for name in ("psi", "port.n", "V_w"):
+        assert len({tuple(run[name].round(9)) for run in runs}) == 4, name
+
+
+@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if "execute_at" in kind.model_fields])
+def test_a_first_order_after_the_end_of_the_run_is_refused(kind: str) -> None:
+    """Such a run was straight, and was called a zigzag."""
+    block = {"kind": kind, **BLOCKS[kind]}
+    check_truth(truth({**block, "execute_at": 19.0}), SHIP)
+    if "duration" not in KINDS[kind].model_fields:  # it ends so long after its first order
+        check_truth(truth({**block, "execute_at": 300.0}), SHIP)
+        return
+    for late in (20.0, [0.0, 300.0]):
+        with pytest.raises(DocumentError, match="the run ends at 20 s, before the first order: give less") as caught:
+            check_truth(truth({**block, "execute_at": late}), SHIP)
+        assert caught.value.path == "truth.manoeuvre.0.execute_at"
+
+
+def test_shares_are_met_and_no_run_depends_on_their_number() -> None:
+    """400 draws: a share of 0.3 within 5 standard errors."""
+    blocks = {"kind": "zigzag", "share": 0.3, **SHAFT}, {"kind": "turning", "share": 0.7, **BLOCKS["turning"]}
+    many = draw_manoeuvres(truth(*blocks, manoeuvres=400))
+    zigzags = [isinstance(one, Zigzag) for one in many]
+    assert abs(np.mean(zigzags) - 0.3) < 5 * np.sqrt(0.3 * 0.7 / 400)
+    assert many[:50] == draw_manoeuvres(truth(*blocks, manoeuvres=50))
+    doubled = [{**block, "share": 2 * block["share"]} for block in blocks]
+    assert many == draw_manoeuvres(truth(*doubled, manoeuvres=400))
+
+
+def test_pairs_are_drawn_where_a_number_is_wanted() -> None:
+    def at(place: float) -> Any:
+        return lambda _: place
+
+    zigzag = ManoeuvreDraw(kind="zigzag", n_rpm=[80, 150], angle_deg=20, side=["starboard", "port"])
+    low, high = (zigzag.manoeuvre(60.0, at(place)) for place in (0.0, 0.999))
+    assert low == Zigzag(n_rpm=80, angle_deg=20, side="starboard", duration=60, course_deg=0)
+    assert isinstance(high, Zigzag)
+    assert (high.n_rpm, high.angle_deg, high.side) == (pytest.approx(149.93), 20, "port")
+    assert high.course_deg == pytest.approx(359.64)
+    fixed = ManoeuvreDraw(kind="zigzag", n_rpm=100, course_deg=[30, 40]).manoeuvre(60.0, at(0.5))
+    assert fixed.course_deg == 35
+    spiral = ManoeuvreDraw(kind="spiral", n_rpm=100, hold=10, angles_deg=[15, -15]).manoeuvre(60.0, at(0.5))
+    assert isinstance(spiral, Spiral)
+    assert spiral.angles_deg == (15, -15)
+    steps = ManoeuvreDraw(kind="steps", n_rpm=100, alpha_deg=[-10, 20]).manoeuvre(60.0, at(0.5))
+    assert isinstance(steps, StepManoeuvre)
+    assert steps.orders == {"n_rpm": (100, 100), "alpha_deg": (-10, 20)}
+
+
+@pytest.mark.parametrize(
+    ("block", "message"),
+    [
+        ({"kind": "zigzags", **SHAFT}, "did you mean 'zigzag'"),
+        ({"kind": "zigzag", "n_rpm": [150.0, 80.0]}, "n_rpm has low > high"),
+        ({"kind": "zigzag", "n_rpm": [1.0, 2.0, 3.0]}, r"n_rpm: give a number or \[low, high\]"),
+        ({"kind": "zigzag", **SHAFT, "angle_deg": [-5.0, 5.0]}, "angle_deg: must be above 0"),
+        ({"kind": "zigzag", **SHAFT, "duration": 5.0}, r"duration: no key of zigzag: \[truth\] gives it"),
+        ({"kind": "zigzag", **SHAFT, "side": ["port", "left"]}, "side: must be"),
+        ({"kind": "zigzag"}, "n_rpm: missing"),
+        ({"kind": "steps", **SHAFT, "hold": [5.0]}, "hold.1: missing"),
+        ({"kind": "steps", **SHAFT, "hold": [20.0, 5.0]}, r"hold: low > high: give \[low, high\]"),
+        ({"kind": "excitation", **SHAFT, "hold": [20.0, 5.0]}, "hold: low > high"),
+        ({"kind": "steps", "n_rpm": [1.0, True]}, "n_rpm: give a number"),
+        ({"kind": "turning", "share": 0.0, **SHAFT}, "must be above 0"),
+    ],
+)
+def test_blocks_that_mean_nothing_are_refused(block: dict[str, Any], message: str) -> None:
+    with pytest.raises(DocumentError, match=message):
+        truth(block)
+
+
+def test_a_vessel_that_cannot_is_refused_beforehand() -> None:
+    rudder = load_vessel("mariner")
+    blocks = {"kind": "zigzag", **SHAFT}, {"kind": "crash_stop", **BLOCKS["crash_stop"]}
+    with pytest.raises(DocumentError, match="cannot stop") as caught:
+        check_truth(truth(*blocks), rudder)
+    assert caught.value.path == "truth.manoeuvre.1"

@@ -1,7 +1,5 @@
 """The chain of the paper on a part of the study `paper-small`: degraded physics, rollouts, PyTorch, TPE."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import optuna

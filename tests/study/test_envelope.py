@@ -1,7 +1,5 @@
 """The envelope of the paper's simulation study, beside what the paper published."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A study that is written for a vessel and its runs: it parses, it prepares, and its choices follow the data."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path
@@ -23,6 +21,7 @@ from shipid.simulation.approach import Controls
 from shipid.study.new import (
     LEAST_AMOUNT,
     SHARE_OF_RUN,
+    Survey,
     _degraded_families,
     _ordinary_sensors,
     _ordinary_weather,
@@ -34,8 +33,10 @@ from shipid.study.new import (
     draft_study,
     horizon_of,
     proposed_horizon,
+    separation_of_sources,
     step_of,
     survey_dataset,
+    typical_runs,
 )
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain_runs, prepare
@@ -43,6 +44,7 @@ from shipid.study.run import run_study
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
 from shipid.vessel.template import Particulars, first_guess
+from tests.logs.conftest import as_dataset, turning
 from tests.study.tiny import logged, physics_errors
 
 SHIP = "gunnerus-33.9"
@@ -446,3 +448,53 @@ def test_without_a_vessel_short_runs_set_the_horizon_and_say_so() -> None:
 def test_neither_a_vessel_nor_runs_is_refused() -> None:
     refused = CliRunner().invoke(app, ["study", "new"])
     assert "--vessel: missing: give a vessel, or recorded runs as --data, or both" in str(refused.exception)
+
+
+T = np.arange(0.0, 100.0, 0.5)
+
+
+def test_a_steady_turn_is_described_by_its_numbers() -> None:
+    summary = survey_dataset(as_dataset(turning(T), turning(T[:81])))
+    assert list(summary.runs.index) == ["a", "b"]
+    assert summary.runs["duration"].tolist() == [99.5, 40.0]
+    assert summary.step == 0.5
+    assert summary.speed == pytest.approx(np.hypot(4.0, 0.5))
+    np.testing.assert_allclose(summary.runs["rate"], 0.05)
+    assert summary.runs["whole"].all()
+
+
+def test_a_broken_run_is_judged_by_its_longest_piece() -> None:
+    frame = turning(T)
+    frame["flags"] = np.where(T == 30.0, 1, 0)
+    summary = survey_dataset(as_dataset(frame)).runs.loc["a"]
+    assert not summary["whole"]
+    assert summary["duration"] == 99.5 - 30.0
+
+
+def test_jitter_does_not_grow_with_the_lag_and_a_wrong_speed_does() -> None:
+    rng, frame = np.random.default_rng(2), turning(T)
+    jitter = as_dataset(frame.assign(north=frame["north"] + rng.normal(0, 2.0, len(T))))
+    wrong = as_dataset(frame.assign(u=1.1 * frame["u"]))
+    assert separation_of_sources(jitter, 20.0) == pytest.approx(separation_of_sources(jitter, 5.0), rel=0.3)
+    assert separation_of_sources(wrong, 20.0) > 3 * separation_of_sources(wrong, 5.0)
+    assert separation_of_sources(wrong, 1000.0) == 0.0
+
+
+def surveyed(kinds: list[str], speeds: list[float], failed: str = "") -> Survey:
+    numbers = {"kind": kinds, "speed": speeds, "rate": 0.05, "helm": 0.2, "whole": True, "duration": 60.0}
+    runs = pd.DataFrame(numbers, index=list("abcdefgh"[: len(kinds)]))
+    runs.loc["a", "duration"] = 90.0
+    return Survey(runs, 1.0, pd.DataFrame({"run": list(failed)}))
+
+
+def test_the_typical_run_is_the_middle_one_and_neither_broken_nor_faulty() -> None:
+    one = surveyed(["zigzag"] * 5, [5.0, 3.0, 3.9, 4.0, 4.1])
+    assert typical_runs(one) == ["d"]
+    one.runs.loc["d", "whole"] = False
+    assert typical_runs(one)[0] in ("c", "e")
+    assert typical_runs(surveyed(["zigzag"] * 5, [5.0, 3.0, 3.9, 4.0, 4.1], "ed")) == ["c"]
+
+
+def test_each_kind_gives_a_typical_run_where_more_than_six_runs_are_there() -> None:
+    for count, chosen in ((6, 1), (8, 2)):
+        assert len(typical_runs(surveyed(["zigzag", "turning"] * (count // 2), [3.0] * count))) == chosen

@@ -1,7 +1,5 @@
 """A run's folder, read: cells, paths and the command that reproduces it."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Keys of a study document: times in whole steps."""
 
-from __future__ import annotations
-
 import pytest
 
 from shipid.study.schema import Prediction

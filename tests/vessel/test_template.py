@@ -1,7 +1,5 @@
 """First guesses: formulae against measured ships, documents that run, refusals in one line."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import replace
 from pathlib import Path

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.data.checks import stuck_spans
 from shipid.data.dataset import FIRST_DATED_TIME, Array
-from shipid.data.stuck import stuck_spans
 from shipid.logs.dates import LAST_DATE, format_date
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State

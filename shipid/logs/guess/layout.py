@@ -25,8 +25,7 @@ from shipid.logs.mapping import is_position
 from shipid.logs.nmea import is_nmea
 from shipid.logs.readers import READERS, grouped_number
 from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_with_values
-from shipid.plugins import describe_error, log_warning
-from shipid.users import is_user_code
+from shipid.plugins import describe_error, is_user_code, log_warning
 
 ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
