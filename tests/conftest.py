@@ -1,5 +1,7 @@
 """What the tests of all floors share: the data folder, and vessels of every structure that the equations know."""
 
+from __future__ import annotations
+
 import gc
 import os
 import signal

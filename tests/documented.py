@@ -1,5 +1,7 @@
 """The code of docs/extending.md as its reader would write it: as a module, or as a commit in a copy of the tree."""
 
+from __future__ import annotations
+
 import ast
 import re
 import sys

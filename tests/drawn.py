@@ -1,5 +1,7 @@
 """Few drawn cases of a law in every run of the tests, and many more in the slow ones."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

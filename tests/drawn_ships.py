@@ -4,6 +4,8 @@ Sizes of numbers are those of ships from 0.8 to 350 m, so that a rollout of a fe
 them is sensible.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,5 +1,7 @@
 """Names of a package: each says in another file what it is, and none stands in two modules. `python -m tests.names`."""
 
+from __future__ import annotations
+
 import ast
 import re
 import sys

@@ -1,5 +1,7 @@
 """`python -m shipid` is the command `shipid`."""
 
+from __future__ import annotations
+
 import os
 import subprocess
 import sys

@@ -1,5 +1,7 @@
 """Arguments of any type that means the same are taken, and all others are refused in one line."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

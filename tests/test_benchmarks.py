@@ -1,5 +1,7 @@
 """The rule of `make bench`: a ratio that is worse than recorded by more than 20 % fails, whichever way is better."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

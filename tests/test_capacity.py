@@ -1,5 +1,7 @@
 """The machine: its processor has a name, and memory that cannot be had is reported in GiB."""
 
+from __future__ import annotations
+
 import os
 from pathlib import Path
 

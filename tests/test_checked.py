@@ -1,5 +1,7 @@
 """Classes that callers from Python make: a wrong argument is one line with class, argument and remedy."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

@@ -1,5 +1,7 @@
 """Every example of docs/extending.md as a commit in a copy of the tree: it passes `make check` and the laws there."""
 
+from __future__ import annotations
+
 import os
 import subprocess
 import sys

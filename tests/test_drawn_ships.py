@@ -1,5 +1,7 @@
 """Laws over ships that nobody would build: every engine says the same of them, at any state that a ship can be in."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

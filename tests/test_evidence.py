@@ -1,5 +1,7 @@
 """Intervals over test manoeuvres: what they cover, and what corrections do by hand."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

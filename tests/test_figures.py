@@ -1,5 +1,7 @@
 """Every figure of the reports as a function, from results, contents or simple frames."""
 
+from __future__ import annotations
+
 import inspect
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints

@@ -1,5 +1,7 @@
 """Files appear whole or not at all, whatever goes wrong while they are written."""
 
+from __future__ import annotations
+
 import errno
 import io
 import json

@@ -1,5 +1,7 @@
 """Ctrl-C during a block is held back, and raised when the block ends."""
 
+from __future__ import annotations
+
 import signal
 import threading
 from collections.abc import Callable, Iterator

@@ -1,5 +1,7 @@
 """One law, all members: every term of the physics obeys these, and a new term is tested unasked."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

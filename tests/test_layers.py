@@ -1,5 +1,7 @@
 """The contracts of pyproject.toml: the package keeps them, and an import that breaks one is refused."""
 
+from __future__ import annotations
+
 import shutil
 import subprocess
 import sys

@@ -1,5 +1,7 @@
 """Every source file has a test file of the same name in the mirrored folder."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]

@@ -1,5 +1,7 @@
 """What an object shows of itself: one short line, and a table that has what it is and escapes what it is called."""
 
+from __future__ import annotations
+
 import dataclasses
 import sys
 from pathlib import Path

@@ -1,5 +1,7 @@
 """The observer: laws of its equations, causality, missing samples, and what it buys in seeded worlds."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace

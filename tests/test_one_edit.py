@@ -1,5 +1,7 @@
 """One edit is enough: a signal, a term, a manoeuvre is one entry, added while they run."""
 
+from __future__ import annotations
+
 import json
 import re
 from dataclasses import replace

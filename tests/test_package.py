@@ -1,5 +1,7 @@
 """What a wheel says of itself: nothing that only a copy of the repository has, authors as in CITATION.cff."""
 
+from __future__ import annotations
+
 import email
 import re
 import subprocess

@@ -1,5 +1,7 @@
 """An installed package adds to shipid without an edit; a broken one is one line and harms nothing; so is a file."""
 
+from __future__ import annotations
+
 import os
 import shutil
 import subprocess

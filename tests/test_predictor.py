@@ -1,5 +1,7 @@
 """Predictors: what is saved is what is loaded, nothing else is; and they predict along a log."""
 
+from __future__ import annotations
+
 import json
 import re
 from dataclasses import MISSING, fields, replace

@@ -1,5 +1,7 @@
 """Pages list what the code has: keys and options are made from it; methods, manoeuvres and measures have a row."""
 
+from __future__ import annotations
+
 import re
 import sys
 from importlib import import_module

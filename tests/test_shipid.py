@@ -1,5 +1,7 @@
 """What one imports: public names, their types, and what an installed shipid takes along."""
 
+from __future__ import annotations
+
 import json
 import os
 import re

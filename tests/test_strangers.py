@@ -1,5 +1,7 @@
 """Strangers are ships: a seed makes one, its log is a dataset, and a first guess of it is checked by its log."""
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,5 +1,7 @@
 """Raw files of strangers: a seed makes the same bytes, and each column is what its truth says."""
 
+from __future__ import annotations
+
 import csv
 import io
 

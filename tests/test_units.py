@@ -1,5 +1,7 @@
 """Factors to SI against quantities that are known in both units."""
 
+from __future__ import annotations
+
 import math
 
 import pytest

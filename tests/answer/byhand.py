@@ -1,5 +1,7 @@
 """Results made by hand, so that a sentence or a verdict can be foretold."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -4,6 +4,8 @@ Error = true mean x how hard the manoeuvre is x how it suits the model x what on
 by model, amount and seed, and has a part that all models of one amount and seed share (the runs that were drawn).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

@@ -1,5 +1,7 @@
 """Bands of a study: what its cells keep, what the frames say, refits, and a log with a band."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Any runs side by side: which cells match, and differences that follow by hand."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable
 from dataclasses import replace

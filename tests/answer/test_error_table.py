@@ -1,5 +1,7 @@
 """Errors by test manoeuvre: the means of a study are the weighted means of its table."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

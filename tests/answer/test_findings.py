@@ -1,5 +1,7 @@
 """Verdicts R1 to R4 on tables made by hand, and which findings a study gets."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

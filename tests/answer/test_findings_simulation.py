@@ -1,5 +1,7 @@
 """Verdicts S1 to S7 on maps H(A, N_D) made by hand: what confirms, what refutes, what cannot be decided."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Frames for the report: recomputed from the folder, in the units that they are labelled with."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

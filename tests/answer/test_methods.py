@@ -1,5 +1,7 @@
 """What the comparison of methods says, on tables made by hand and drawn by seed."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

@@ -1,5 +1,7 @@
 """The pages of a run's folder, assembled from its results."""
 
+from __future__ import annotations
+
 import shutil
 import threading
 from pathlib import Path

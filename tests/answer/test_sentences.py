@@ -1,5 +1,7 @@
 """Sentences on tables made by hand: the numbers they name, the harm they tell, the doubt they keep."""
 
+from __future__ import annotations
+
 import re
 from dataclasses import replace
 from typing import Any

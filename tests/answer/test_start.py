@@ -1,5 +1,7 @@
 """`run` and `events`: the words of the command line, as functions."""
 
+from __future__ import annotations
+
 import logging
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Words of verdicts and numbers."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The tiny study as a file."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

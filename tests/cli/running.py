@@ -1,5 +1,7 @@
 """Run commands in this process, or as a user would."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout

@@ -1,5 +1,7 @@
 """`--json`: one object on standard output and nothing else, with what the tables show."""
 
+from __future__ import annotations
+
 import json
 import threading
 from pathlib import Path

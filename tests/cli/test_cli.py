@@ -1,5 +1,7 @@
 """The command line as a whole: help, mistakes in one line, interruptions, logging."""
 
+from __future__ import annotations
+
 import errno
 import os
 import re

@@ -1,5 +1,7 @@
 """`shipid data`."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """`shipid expect`: an answer from particulars, from a study, and one line where they are wrong."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """`shipid export` from the command line."""
 
+from __future__ import annotations
+
 from typer.testing import CliRunner
 
 from shipid.cli import app

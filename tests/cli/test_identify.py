@@ -1,5 +1,7 @@
 """`shipid identify`: what its options mean; tests/identification/test_command.py runs it."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,5 +1,7 @@
 """`shipid predict`."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

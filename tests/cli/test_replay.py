@@ -1,5 +1,7 @@
 """`shipid replay`: a run on the vessel that made it comes back; another vessel errs; mistakes are one line."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """`shipid simulate` and `shipid manoeuvre`."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

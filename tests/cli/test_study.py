@@ -1,5 +1,7 @@
 """`shipid study`."""
 
+from __future__ import annotations
+
 import errno
 import re
 from pathlib import Path

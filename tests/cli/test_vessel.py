@@ -1,5 +1,7 @@
 """`shipid vessel`."""
 
+from __future__ import annotations
+
 import json
 import re
 from pathlib import Path

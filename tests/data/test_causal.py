@@ -1,5 +1,7 @@
 """Values interpolated between fixes are replaced by the last one that was known by then."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

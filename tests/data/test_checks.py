@@ -1,5 +1,7 @@
 """A clean log passes every check; each defect put into it fails the check for it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Every operation that the physics may use, for the tests of what prints them."""
 
+from __future__ import annotations
+
 import casadi as ca
 
 

@@ -1,5 +1,7 @@
 """The reverse sweep: checks of the loss, the recorded step, and the values that it needs."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """The CasADi engine: actuator states along recorded orders."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from shipid.engine.casadi import BLOCK, evaluate_samples, memory_along

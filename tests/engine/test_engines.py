@@ -1,5 +1,7 @@
 """The dict of engines: a new one is one line, `auto` chooses by size, and what an engine cannot do is reported."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

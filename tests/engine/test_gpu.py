@@ -1,5 +1,7 @@
 """Engines that run on a GPU agree with those of the processor; skipped where PyTorch sees no GPU."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Gradients of every structure: finite differences are the judge, and all engines that can agree."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

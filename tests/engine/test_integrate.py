@@ -1,5 +1,7 @@
 """The integrator: order of accuracy of Euler and RK4, and exact memories."""
 
+from __future__ import annotations
+
 import math
 
 import pytest

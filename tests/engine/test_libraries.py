@@ -1,5 +1,7 @@
 """Compiled libraries: whatever lies in the cache or happens to the compiler, a rollout gives its numbers or a line."""
 
+from __future__ import annotations
+
 import logging
 import os
 import stat

@@ -1,5 +1,7 @@
 """The lowered step against CasADi: numbers, derivatives, batches, failures, compilations."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

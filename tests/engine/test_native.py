@@ -1,5 +1,7 @@
 """The native engine: operations, groups and remainders, its cache, and what it says where it cannot work."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

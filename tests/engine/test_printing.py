@@ -1,5 +1,7 @@
 """Printing of SX functions: stages, saved values, and operations without a counterpart."""
 
+from __future__ import annotations
+
 import casadi as ca
 import pytest
 

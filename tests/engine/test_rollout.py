@@ -1,5 +1,7 @@
 """Rollouts of every vessel: laws of the path, order of the integrators, what comes in and what is refused."""
 
+from __future__ import annotations
+
 import os
 import signal
 from collections.abc import Callable

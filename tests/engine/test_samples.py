@@ -1,5 +1,7 @@
 """A function on many samples: C and the virtual machine agree on every number, also on what is none."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
 

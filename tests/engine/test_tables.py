@@ -1,5 +1,7 @@
 """Tables: found in functions, and looked up in C with the values of their ramps."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Tasks in C on threads: each is done once, in calls between which an interrupt takes effect."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,7 @@
 """The PyTorch engine: width of blocks. `test_lowering.py` has its agreement with CasADi."""
 
+from __future__ import annotations
+
 import pytest
 
 torch = pytest.importorskip("torch")

@@ -1,5 +1,7 @@
 """The functions on vectors, in both precisions: close to the truth, odd and even to the bit, no number from none."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product

@@ -1,5 +1,7 @@
 """Laws of what to buy: prices, scale, certainty, and what looking is worth, by hand and over drawn ships."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

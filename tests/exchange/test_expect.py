@@ -1,5 +1,7 @@
 """What to expect before there are data, and with more runs than a study has."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

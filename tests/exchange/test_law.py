@@ -1,5 +1,7 @@
 """The law of exchange: it finds the law that cells are drawn from, and its intervals hold on ships not seen."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

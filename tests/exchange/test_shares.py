@@ -1,5 +1,7 @@
 """Shares of H by number: right where the world is linear, silent where members tell nothing."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

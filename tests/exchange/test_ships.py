@@ -1,5 +1,7 @@
 """Ships whose cells teach the law: the same in any order, none of the template, each cell once; a start resumes."""
 
+from __future__ import annotations
+
 import sys
 from pathlib import Path
 

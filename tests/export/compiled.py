@@ -1,5 +1,7 @@
 """Exported C, compiled and called from Python."""
 
+from __future__ import annotations
+
 import ctypes
 import shutil
 import subprocess

@@ -1,5 +1,7 @@
 """Predictors that nobody has fitted: every method with drawn numbers, on drawn vessels, horizons and memories."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Bands in C and in CasADi: those of Python, and none where none can be promised."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import casadi as ca

@@ -1,5 +1,7 @@
 """C99 of predictors and vessels: the same numbers as Python, whatever the predictor."""
 
+from __future__ import annotations
+
 import ctypes
 import re
 import shutil

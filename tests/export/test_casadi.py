@@ -1,5 +1,7 @@
 """CasADi files: the same numbers, and loops that are closed with them."""
 
+from __future__ import annotations
+
 import json
 import os
 import re

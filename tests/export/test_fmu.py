@@ -1,5 +1,7 @@
 """FMUs of vessels and predictors: what a tool that imports them sees."""
 
+from __future__ import annotations
+
 import ctypes
 import logging
 import os

@@ -1,5 +1,7 @@
 """ONNX: the networks alone, in both precisions."""
 
+from __future__ import annotations
+
 import json
 
 import numpy as np

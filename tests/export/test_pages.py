@@ -1,5 +1,7 @@
 """The examples of the pages on exports run as they are printed."""
 
+from __future__ import annotations
+
 import re
 import subprocess
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Angles aboard: whatever turn a live angle comes by, the path is that of angles that go on."""
 
+from __future__ import annotations
+
 import copy
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What a user asks for is written, or refused in one line."""
 
+from __future__ import annotations
+
 import json
 import re
 from collections.abc import Callable, Mapping

@@ -1,5 +1,7 @@
 """Run the campaign: `python -m tests.faults [--scale 5] [--seed 0] [--only killed]`; it ends with 1 on failures."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 import time

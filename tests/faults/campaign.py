@@ -1,5 +1,7 @@
 """The rows of the campaign and how many trials each has: what the product must survive, and how the fault is made."""
 
+from __future__ import annotations
+
 import sys
 import time
 from collections.abc import Callable

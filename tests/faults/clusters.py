@@ -1,5 +1,7 @@
 """Rows of the campaign: a Dask scheduler or its workers die, and hosts with other processors share a folder."""
 
+from __future__ import annotations
+
 import os
 import random
 import re

@@ -1,5 +1,7 @@
 """Rows of the campaign: mutated documents, read and used as a user would."""
 
+from __future__ import annotations
+
 import random
 import re
 import resource

@@ -1,5 +1,7 @@
 """Rows of the campaign: folders of results that are killed, filled up, shared and damaged, and then continued."""
 
+from __future__ import annotations
+
 import atexit
 import errno
 import io

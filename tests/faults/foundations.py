@@ -1,5 +1,7 @@
 """Rows of the campaign: simulators of others that misbehave: FMUs, functions, tables of predictions; and packages."""
 
+from __future__ import annotations
+
 import io
 import random
 import re

@@ -1,5 +1,7 @@
 """Mutations of TOML documents, drawn by seed: values that no one expects, and text that is no TOML any more."""
 
+from __future__ import annotations
+
 import random
 import re
 from collections.abc import Callable

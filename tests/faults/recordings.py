@@ -1,5 +1,7 @@
 """Rows of the campaign: damaged recordings of every format, read and guessed as a user would."""
 
+from __future__ import annotations
+
 import io
 import itertools
 import random

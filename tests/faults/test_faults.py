@@ -1,5 +1,7 @@
 """A few seconds of the campaign of faults; `make faults` runs more of it."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

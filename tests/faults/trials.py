@@ -1,5 +1,7 @@
 """Each trial in a new process: each ends in an outcome, and none may hang or bring the campaign down."""
 
+from __future__ import annotations
+
 import multiprocessing
 import os
 import resource

@@ -1,5 +1,7 @@
 """FMUs of nobody's: a ship in C of FMI 2.0 or 3.0, made for a test, and the same ship in NumPy."""
 
+from __future__ import annotations
+
 import inspect
 import shutil
 import subprocess

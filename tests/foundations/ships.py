@@ -1,5 +1,7 @@
 """Simulators of tests: the rollout of a vessel as a function, as a module of a user, and as a table of its paths."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

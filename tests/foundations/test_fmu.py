@@ -1,5 +1,7 @@
 """FMUs of others give the motion of the same ship in NumPy; of shipid's own, that of the vessel."""
 
+from __future__ import annotations
+
 import re
 import zipfile
 from pathlib import Path

@@ -1,5 +1,7 @@
 """FMUs in studies: as families beside the vessel that they were exported from, and as the truth."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

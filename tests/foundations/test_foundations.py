@@ -1,5 +1,7 @@
 """The law of all simulators: what says the vessel's own paths has the digits of the vessel's own family."""
 
+from __future__ import annotations
+
 import json
 import re
 import shlex

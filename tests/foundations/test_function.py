@@ -1,5 +1,7 @@
 """A function as physics: what it is given, what is refused in one line, and families of its numbers."""
 
+from __future__ import annotations
+
 import pickle
 from collections.abc import Iterator
 from contextlib import nullcontext

@@ -1,5 +1,7 @@
 """Tables of paths as physics: what they must hold, and methods that ask for more than paths."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Every method with settings that make it quick, that of docs/extending.md too, and a small world for them."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

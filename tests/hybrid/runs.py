@@ -1,5 +1,7 @@
 """Runs made by hand: predicted paths, and errors that are alike within a run and drawn anew for each."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

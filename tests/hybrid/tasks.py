@@ -1,5 +1,7 @@
 """Tasks made by hand: columns and what the physics misses, without a vessel."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 

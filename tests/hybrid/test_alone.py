@@ -1,5 +1,7 @@
 """Physics alone: the path of the foundation, whatever the data."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from shipid.data.windows import Instants

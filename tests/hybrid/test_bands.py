@@ -1,5 +1,7 @@
 """Bands: regions, their growth, what they refuse, and how they adapt along a run."""
 
+from __future__ import annotations
+
 import itertools
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Calibration: the share that was promised, whatever the runs are like; no unit and no order matters."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

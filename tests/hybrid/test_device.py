@@ -1,5 +1,7 @@
 """What computes: one thread is one thread for every library."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 from collections.abc import Iterator

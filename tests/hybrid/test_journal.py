@@ -1,5 +1,7 @@
 """The journal of trials: a write that was cut off harms nothing; and what Optuna opens."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Kernel ridge regression as plain NumPy writes it; port and starboard are alike."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """The kernel by hand, and the group of every input."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from shipid.hybrid.kernel_compensator import GROUPS, kernel_group, weighed_kernels

@@ -1,5 +1,7 @@
 """What the closed form says of runs left out is what refits without them say, and no run chooses for itself."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

@@ -1,5 +1,7 @@
 """The learned force: bounds by hand, what the ridge does, what it learns, and what is refused."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

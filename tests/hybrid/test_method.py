@@ -1,5 +1,7 @@
 """The skeleton of a method: what a task holds, and inputs that foundations share."""
 
+from __future__ import annotations
+
 import re
 from typing import Any, ClassVar
 

@@ -1,5 +1,7 @@
 """Laws that every method obeys, on one small world; a method is added to METHODS and is tested here unasked."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable
 from dataclasses import replace

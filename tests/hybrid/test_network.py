@@ -1,5 +1,7 @@
 """A network of one's own: searched by Optuna, saved, read back, interrupted and exported."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 from typing import Any

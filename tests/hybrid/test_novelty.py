@@ -1,5 +1,7 @@
 """The alarm: laws that it keeps for any inputs, and a change of orders that no run of training had."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """The physics of a predictor: paths in the frame of the instant, their slopes, and what is refused."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

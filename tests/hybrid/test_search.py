@@ -1,5 +1,7 @@
 """A search that was interrupted goes on to the digits of one that was not; a budget is a number of trials."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """Fitted objects: what is stored says what was, and what is damaged is refused."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """Made-up worlds in which one thing is missing from the physics, and what a method makes of them."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

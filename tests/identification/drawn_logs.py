@@ -3,6 +3,8 @@
 A bundled vessel is scaled by Froude; its coefficients are drawn anew. The guess is wrong in the numbers to identify.
 """
 
+from __future__ import annotations
+
 import re
 from dataclasses import dataclass
 

@@ -4,6 +4,8 @@ The logs hold the rudder angle as it stood, so the vessel to identify has no ste
 sails by herself she has one: the helmsman of the tests is late, by the same time in all of them.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache

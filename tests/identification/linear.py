@@ -1,5 +1,7 @@
 """A linear model with known truth: sensitivities of runs that differ, noise of any colour."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Bands on manoeuvres of an identified vessel: linear measures exactly, coverage, and when there is none."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

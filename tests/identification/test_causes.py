@@ -1,5 +1,7 @@
 """Laws of causes: no size changes nothing, what has no size is undone by itself, a repair holds its numbers."""
 
+from __future__ import annotations
+
 import tomllib
 
 import numpy as np

@@ -1,5 +1,7 @@
 """`shipid identify`: what it prints and writes, and that a mistake is one line which writes nothing."""
 
+from __future__ import annotations
+
 import json
 import os
 import signal

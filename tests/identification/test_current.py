@@ -1,5 +1,7 @@
 """Laws of currents that no log has: none, one of all runs, or one by run is estimated, as the residuals show."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import cache
 

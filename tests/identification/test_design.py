@@ -1,5 +1,7 @@
 """Design: information adds, what excites a parameter ranks first for it, units and limits are respected."""
 
+from __future__ import annotations
+
 from functools import cache
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Ships of any size and speed: the fit by default predicts runs held out no worse than the guess did."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """The drawn ships and logs agree with their documents and with their truth."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

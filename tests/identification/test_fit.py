@@ -1,5 +1,7 @@
 """Laws of the search: eliminated unknowns are optimal, gradients are exact, bounds hold, progress can end it."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,5 +1,7 @@
 """Free runs: a vessel reproduces its simulated log, pieces begin at measured states, errors are root mean squares."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """R/V Gunnerus from her particulars: identified on half of her trials, she is predicted on the other half."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

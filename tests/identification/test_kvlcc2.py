@@ -1,5 +1,7 @@
 """KVLCC2 identified from 6 of HSVA's 13 zigzags predicts the other 7; figures in docs/identification-kvlcc2.md."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

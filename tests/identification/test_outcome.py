@@ -1,5 +1,7 @@
 """The whole of an identification: the report agrees with the fit, and a patch is the identified vessel."""
 
+from __future__ import annotations
+
 import math
 import os
 import signal

@@ -1,5 +1,7 @@
 """Ranges hold for every bundled vessel, and refuse what no ship has."""
 
+from __future__ import annotations
+
 import pytest
 
 from shipid.identification.plausible import implausibility, plausible_factors

@@ -1,5 +1,7 @@
 """Profiles: the linear one is the interval of the standard error, others follow their formula, open ends are named."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the variational step: derivatives are differences, residuals are those of the rollout, engines agree."""
 
+from __future__ import annotations
+
 from functools import cache
 
 import numpy as np

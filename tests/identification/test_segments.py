@@ -1,5 +1,7 @@
 """Runs become predictions: gaps part them, ends that are too short are left, rows between the steps count for none."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """The variational step: structure of a layout, states that are left out, and derivatives of one step."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

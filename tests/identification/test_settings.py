@@ -1,5 +1,7 @@
 """The `[identify]` table: validation, factors with bounds and priors, ties, and overrides of single runs."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of identify: what made the data is recovered, what is declared holds, and each failure is one sentence."""
 
+from __future__ import annotations
+
 import math
 import signal
 

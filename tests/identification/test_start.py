@@ -1,5 +1,7 @@
 """Laws of the start: growing horizons lead a lost start to where whole runs can be predicted."""
 
+from __future__ import annotations
+
 from functools import cache
 
 import numpy as np

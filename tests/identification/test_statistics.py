@@ -1,5 +1,7 @@
 """Statistics of a fit: intervals cover, what is not identified is named, nothing depends on units or order."""
 
+from __future__ import annotations
+
 import re
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """A hull exchanged for another: the same forces, the numbers that stay free, and what is refused."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """A first guess and noisy voyages in gusty wind become a ship that predicts voyages which the fit has not seen."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

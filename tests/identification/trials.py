@@ -1,5 +1,7 @@
 """Trials by the simulator of shipid: random orders held for a while, logged once a step, without noise."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Noisy voyages in gusty wind at 10 Hz, and a first guess of the ship from her main particulars."""
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 

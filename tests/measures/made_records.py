@@ -1,5 +1,7 @@
 """Manoeuvres whose motion is known in closed form, sampled as densely as one likes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
 

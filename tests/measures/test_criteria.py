@@ -1,5 +1,7 @@
 """Limits of IMO MSC.137(76), 5.3, and when a manoeuvre is judged by them."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

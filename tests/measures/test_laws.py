@@ -1,5 +1,7 @@
 """Laws that the measures of every kind of manoeuvre obey."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

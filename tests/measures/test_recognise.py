@@ -1,5 +1,7 @@
 """From columns to a record: which angle is the helm, and which way it turns the ship."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """Instants between samples."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

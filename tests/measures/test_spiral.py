@@ -1,5 +1,7 @@
 """Loops of spirals: none for a stable ship, the fold of the curve for an unstable one."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

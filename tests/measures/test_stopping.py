@@ -1,5 +1,7 @@
 """A stop at constant deceleration on a slowly turning heading."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Turning circle and pull-out against motions in closed form."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Zigzags of Nomoto's ship, whose overshoots are known in closed form."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

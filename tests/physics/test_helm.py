@@ -1,5 +1,7 @@
 """Helmsmen's laws alone: what they order and remember, number by number."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import casadi as ca

@@ -1,5 +1,7 @@
 """The learned force: what its formula says by hand, its bounds, its silence, and 200 weights by dotted path."""
 
+from __future__ import annotations
+
 import casadi as ca
 import numpy as np
 

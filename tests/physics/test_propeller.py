@@ -1,5 +1,7 @@
 """A propeller behind a hull against numbers worked by hand; limits of wake and thrust."""
 
+from __future__ import annotations
+
 from functools import cache
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Radiation memory: states against the convolution that they stand for, passivity, and the tables behind the fits."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import casadi as ca

@@ -1,5 +1,7 @@
 """Hydrostatic restoring against a body of vertical columns, and against the hydrostatics of the bundled hulls."""
 
+from __future__ import annotations
+
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 """What functions of symbols return is checked before CasADi makes something else of it."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import casadi as ca

@@ -1,5 +1,7 @@
 """Rudders against the formulae of their sources, written out once more."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import casadi as ca

@@ -1,5 +1,7 @@
 """The table of signals: every row is whole, and every question is answered by the table alone."""
 
+from __future__ import annotations
+
 import re
 
 import pytest

@@ -1,5 +1,7 @@
 """Loads of one wave component: written out as complex numbers, at the encounter of the moving ship."""
 
+from __future__ import annotations
+
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 """Two studies as a report sees them: a simulation (7 models, 3 sizes, 2 seeds) and full scale (4 models, 1 size)."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

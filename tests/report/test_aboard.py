@@ -1,5 +1,7 @@
 """The page of a log played as if at sea."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

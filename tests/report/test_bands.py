@@ -1,5 +1,7 @@
 """The section on bands: what it says and draws, from frames made by hand."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pandas as pd

@@ -1,5 +1,7 @@
 """The section on what to buy: what it says and draws, from ways made by hand."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

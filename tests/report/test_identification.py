@@ -1,5 +1,7 @@
 """The page of an identification, from frames alone."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """The section and the page that compare methods."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The page of one manoeuvre."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """What the report says and draws of shares of H: only what is told apart from nothing."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Panels of a figure as the page draws them."""
 
+from __future__ import annotations
+
 from itertools import product
 
 import plotly.graph_objects as go

@@ -3,6 +3,8 @@
 [-omega^2 (M_RB + M_A) + i omega (K(i omega) + B) + C] xi = F, about the document's origin, time factor exp(+i omega t).
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

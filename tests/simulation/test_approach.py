@@ -1,5 +1,7 @@
 """What commands do, by the equations; the steady approach; how units share a load."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from scipy.optimize import fsolve

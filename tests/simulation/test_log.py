@@ -1,5 +1,7 @@
 """What a simulated ship logs: velocities of the horizontal plane and back, names of runs and columns."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from shipid.simulation.log import body_velocities, horizontal_velocities, number_runs, state_column

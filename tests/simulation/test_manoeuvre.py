@@ -1,5 +1,7 @@
 """Manoeuvres do what the field means by them, on a ship whose turns are known."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import cache
 from typing import Any

@@ -1,5 +1,7 @@
 """The log of performed manoeuvres: columns, times, weather, and what is refused."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

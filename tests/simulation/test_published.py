@@ -1,5 +1,7 @@
 """KVLCC2 and Mariner against published equations and manoeuvres."""
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 import pytest

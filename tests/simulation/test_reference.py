@@ -1,5 +1,7 @@
 """Numbers that nobody here wrote: a co-simulation's turn, and steady states computed apart from this code."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

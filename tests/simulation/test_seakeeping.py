@@ -1,5 +1,7 @@
 """The truth in waves: periods, irregular seas against the linear ship, drift, calm water."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,5 +1,7 @@
 """Standard manoeuvres by name: speeds, sides, steps, and what is refused."""
 
+from __future__ import annotations
+
 import re
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The simulated truth: draws, ranges, and a log that a ship could have written."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

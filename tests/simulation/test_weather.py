@@ -1,5 +1,7 @@
 """The sea: its spectrum, its draws, its directions, and the loads that a table gives in it."""
 
+from __future__ import annotations
+
 from math import gamma
 from pathlib import Path
 from typing import Any

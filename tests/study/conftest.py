@@ -1,5 +1,7 @@
 """What the tests of studies share."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

@@ -1,5 +1,7 @@
 """A log played as if at sea: no prediction sees a later row."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The chain of the paper on a part of the study `paper-small`: degraded physics, rollouts, PyTorch, TPE."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import optuna

@@ -1,5 +1,7 @@
 """`shipid study check`: what is wrong with a folder, in lines."""
 
+from __future__ import annotations
+
 import shutil
 from pathlib import Path
 

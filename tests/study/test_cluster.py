@@ -1,5 +1,7 @@
 """Dask: what dies on a cluster costs nothing that is finished, and is one line; what joins midway helps."""
 
+from __future__ import annotations
+
 import importlib
 import os
 import signal

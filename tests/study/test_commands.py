@@ -1,5 +1,7 @@
 """Commands held or known over the horizon: one number fewer to guess, and the same where nothing changes."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path

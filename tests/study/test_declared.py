@@ -1,5 +1,7 @@
 """What a study declares: names that are one file, members of identified families, observers."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,7 @@
 """The envelope of the paper's simulation study, beside what the paper published."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

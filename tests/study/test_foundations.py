@@ -1,5 +1,7 @@
 """Foundations identified from the runs of a batch, and from no other run."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace

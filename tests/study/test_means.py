@@ -1,5 +1,7 @@
 """Means over foundations: members that a study declares, beside the foundations of which they are the mean."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

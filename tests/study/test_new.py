@@ -1,5 +1,7 @@
 """A study that is written for a vessel and its runs: it parses, it prepares, and its choices follow the data."""
 
+from __future__ import annotations
+
 import re
 import tomllib
 from pathlib import Path

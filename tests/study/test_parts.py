@@ -1,5 +1,7 @@
 """A study of several parts: repetitions and conditions, each a separate run, and a page over all."""
 
+from __future__ import annotations
+
 import shutil
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """A controllable-pitch propeller through a whole study: truth, log, corrections, identification, report."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

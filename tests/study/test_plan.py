@@ -1,5 +1,7 @@
 """Plans: bundled studies, changes from the command line, digests, batches."""
 
+from __future__ import annotations
+
 import re
 import warnings
 from collections.abc import Mapping

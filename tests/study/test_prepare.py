@@ -1,5 +1,7 @@
 """From plan to arrays: splits that share nothing, redraws that never look at the test, hidden states, floors."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """The search that goes on, from journals that others write."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,7 @@
 """A run's folder, read: cells, paths and the command that reproduces it."""
 
+from __future__ import annotations
+
 import shlex
 from pathlib import Path
 

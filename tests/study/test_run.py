@@ -1,5 +1,7 @@
 """Runs: the same numbers whoever computes them and however often they are interrupted; a folder tells all."""
 
+from __future__ import annotations
+
 import importlib
 import re
 import shutil

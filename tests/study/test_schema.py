@@ -1,5 +1,7 @@
 """Keys of a study document: times in whole steps."""
 
+from __future__ import annotations
+
 import pytest
 
 from shipid.study.schema import Prediction

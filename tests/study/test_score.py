@@ -1,5 +1,7 @@
 """Predictions of others: scored as the study scores its own, and what is wrong with them is named."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable
 from pathlib import Path

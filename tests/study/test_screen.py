@@ -1,5 +1,7 @@
 """Screening: the errors of the paths themselves, whatever the block, the engine and the rest of the family."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Seals: what is not as it was written is refused, what is missing is computed again."""
 
+from __future__ import annotations
+
 import errno
 import json
 import os

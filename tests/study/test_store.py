@@ -1,5 +1,7 @@
 """The folder of a run: whose it is, what it holds, and the message where it is damaged."""
 
+from __future__ import annotations
+
 import json
 import re
 import shutil

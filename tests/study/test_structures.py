@@ -1,5 +1,7 @@
 """Structures compared: the one that made the data is chosen by runs held out, and nothing by the fit."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace

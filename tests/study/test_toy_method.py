@@ -1,5 +1,7 @@
 """One edit: the method of docs/extending.md, a class and a line in METHODS, runs through a whole study."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar

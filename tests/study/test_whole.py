@@ -1,5 +1,7 @@
 """One study of every foundation with every method: nothing looks ahead, and each way to use it says the same."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

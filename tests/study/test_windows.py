@@ -1,5 +1,7 @@
 """Windows that go out: what the methods of a study are trained on, and nothing of the future of the test."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Workers: every task once, whoever does it; errors and deaths are reported; no process outlives its iterator."""
 
+from __future__ import annotations
+
 import math
 import multiprocessing
 import os

@@ -1,5 +1,7 @@
 """The smallest study there is: 12 short manoeuvres, 3 models, descents of two steps."""
 
+from __future__ import annotations
+
 import os
 import subprocess
 import sys

@@ -1,5 +1,7 @@
 """Assembled equations of every vessel: laws of the whole, and numbers computed apart."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Vessels of public simulators against their published equations, written out apart: `tests/vessel/published`."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,5 +1,7 @@
 """Numbers that no ship has are refused with the range; the word `unusual` overrides it."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Regressions against published ships and screws."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from scipy.special import elliprd

@@ -1,5 +1,7 @@
 """Similar ships: scaling laws over all bundled vessels, friction and screws, the order of neighbours."""
 
+from __future__ import annotations
+
 import math
 from itertools import islice
 from pathlib import Path

@@ -1,5 +1,7 @@
 """The growth of a small yaw is that of the textbook."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """First guesses: formulae against measured ships, documents that run, refusals in one line."""
 
+from __future__ import annotations
+
 import tomllib
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,7 @@
 """First guesses of small craft: top speed, turns and straight run of drawn ones, and refusals in one line."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

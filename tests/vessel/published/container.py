@@ -4,6 +4,8 @@ Written from container.m of the MSS toolbox (corrected wake of 2022) by a person
 All numbers are in the prime system of length 175 m and the present speed. Shaft ahead, ship ahead.
 """
 
+from __future__ import annotations
+
 from math import atan, cos, pi, sin, sqrt
 
 import numpy as np

@@ -7,6 +7,8 @@ in rev/s: port, starboard, bow; rudders in rad, d > 0 turns to port; drawn withi
 has none. Not where she goes astern and a screw pushes ahead.
 """
 
+from __future__ import annotations
+
 from math import pi, sqrt
 
 import numpy as np

@@ -6,6 +6,8 @@ roll have it; navalvessel.m multiplies it by phi|u phi|. The hull alone: the sou
 rudders from outside, here as X, Y, K, N in N and N m.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 DRAWN = {

@@ -6,6 +6,8 @@ yaw. Kept as in the source: a moment of inertia about the origin that is moved t
 moment, the cross-flow of one pontoon on 21 strips of a twentieth of the length. Shafts in rad/s, with stops.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 DRAWN = {

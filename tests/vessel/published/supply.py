@@ -5,6 +5,8 @@ toolbox has the same two bis matrices and no thrusters, and takes 9.8 m/s^2 wher
 n1 and n2 drive the tunnels at the bow, n3 the starboard screw and n4 the port screw, with stops.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 DRAWN = {

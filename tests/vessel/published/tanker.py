@@ -6,6 +6,8 @@ delta > 0 turns to port. The source has accelerations only, and no mass. Drawn w
 the source stop the rudder at 10 deg and the shaft at 80 rpm.
 """
 
+from __future__ import annotations
+
 from math import atan
 
 import numpy as np
