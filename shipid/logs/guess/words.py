@@ -438,7 +438,7 @@ def is_known_word(word: str) -> bool:
 @cache
 def _split_word(word: str) -> tuple[str, ...]:
     """Cut a word that is no known one into known words, such as `ruderwinkel`; return it whole where it cannot be."""
-    known = _known_words() | {one for side in SIDE_WORDS for one in words_of_side(side) if len(one) > 3}
+    known = _known_words() | {one for words in SIDE_WORDS.values() for one in words if len(one) > 3}
     if word in WHOLE:
         return WHOLE[word]
     if word in known or not 6 <= len(word) <= LONGEST_WORD:
