@@ -15,7 +15,10 @@ ROOT = Path(__file__).parents[1]
 #: sections of the page that are one commit -> what is asked of the copy then: tests, and words that select some of them
 LAWS = {
     ("A signal", "A term"): ["tests/test_laws.py", "tests/physics", "tests/logs/guess/test_words.py"],
-    ("A manoeuvre",): ["tests/simulation/test_manoeuvre.py", "tests/simulation/test_standard.py"],
+    ("A manoeuvre",): [
+        *("tests/simulation/test_manoeuvre.py", "tests/simulation/test_standard.py"),
+        *("-k", "not (example or first_order_after)"),  # they ask for the example that a commit brings
+    ],
     ("A log reader",): ["tests/logs/test_readers.py"],
     ("A family rule",): ["tests/vessel/test_perturb.py"],
     ("A method",): ["tests/hybrid/test_methods.py", "tests/hybrid/test_search.py", "-k", "linear"],
