@@ -69,10 +69,10 @@ def _take_pose(state: State, best: MotionReading) -> None:
     state.position = plane
     _report_axes(state, best, sources, sense)
     named = meaning_scores(pose.heading)
-    if not state.numbered and named.get("psi", 0.0) <= named.get("course", 0.0):
-        sure = min(sure, 0.5)
-        if pose.heading in state.all_called("psi"):
-            words = f"is {pose.heading!r} the heading, or the course over ground? By its name it may be either"
+    if named.get("psi", 0.0) <= named.get("course", 0.0):
+        sure = sure if state.numbered else min(sure, 0.5)
+        if best.velocity is None if state.numbered else pose.heading in state.all_called("psi"):
+            words = f"is {pose.heading!r} the heading, or the course over ground? Its name does not say which"
             state.ask(("psi",), words)
     if pose.turn in TURNS:
         what = f"a whole turn is {pose.turn:g}: {TURNS[pose.turn]}, with which it keeps to the track"

@@ -71,10 +71,10 @@ def test_positions_have_the_unit_of_length_in_their_names(names: tuple[str, str]
 
 
 def test_columns_without_names() -> None:
-    """A mirror image fits as well, which is asked; a signal that is no motion is not taken."""
+    """A course and a mirror image fit as well, which is asked; a signal that is no motion is not taken."""
     state = chosen({"2": np.sin(T / 7), "3": DEG, "4": NORTH, "5": EAST})
     assert sources(state) == {"north": "4", "east": "5", "psi": "3"}
-    assert [question.about for question in state.questions] == [("psi", "north", "east", "delta", "alpha")]
+    assert [question.about for question in state.questions] == [("psi",), ("psi", "north", "east", "delta", "alpha")]
     assert_motion(state)
 
 
