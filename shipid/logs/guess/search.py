@@ -498,8 +498,10 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
             cost += max(by_track, 0.0) - float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)
             cost += 0.1 * (one.side != pose.sense.sign)
             unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
-            if against and by_track > -SETTINGS.alike_left:
-                continue  # the second says nothing of the track
+            ahead = _path_of(state, state.columns[one.first] * turn)
+            across = evidence.fit_scale(seen - fit.scale * ahead, _path_of(state, one.ground) - ahead).scale
+            if not sure and abs(np.log(max(across, 1e-9) / fit.scale)) > 2 * SETTINGS.alike_left:
+                continue  # the second is no sway in the unit of the first: a roll, or nothing
         elif one.kind == "course" and drift > 0.5:
             ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
             unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left
@@ -515,7 +517,12 @@ def _left_by_constant(state: State, seen: Complex, way: NDArray[np.generic]) -> 
 
 def _fit_of_path(state: State, seen: Complex, ground: Complex) -> Fit:
     """How the integral of velocities (N,) in the plane fits the track (W,)."""
-    return evidence.fit_without_outliers(seen, state.chosen.change(evidence.integrate_rate(state.t, ground)))
+    return evidence.fit_without_outliers(seen, _path_of(state, ground))
+
+
+def _path_of(state: State, ground: Complex) -> Complex:
+    """The integral of velocities (N,) over the windows (W,)."""
+    return state.chosen.change(evidence.integrate_rate(state.t, ground))
 
 
 def _pairs_of_velocities(state: State, used: set[str], seen: Complex, turn: Complex) -> Iterator[Velocity]:
