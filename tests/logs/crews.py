@@ -100,7 +100,7 @@ CREWS: dict[str, Crew] = {
     "ArduPilot export": Crew({"time": "timestamp", "lat": "GPS.Lat|GLOBAL_POSITION_INT.lat", "lon": "GPS.Lng|GLOBAL_POSITION_INT.lon", "psi": "ATT.Yaw|ATTITUDE.yaw", "sog": "GPS.Spd|VFR_HUD.groundspeed", "cog": "GPS.GCrs|GPS_RAW_INT.cog", "r": "IMU.GyrZ|ATTITUDE.yawspeed", "phi": "ATT.Roll|ATTITUDE.roll", "delta": "RCOU.C1|SERVO_OUTPUT_RAW.servo1_raw", "n": "RCOU.C3|SERVO_OUTPUT_RAW.servo3_raw"}, {**BOT, "steer": "us", "shaft": "us", "rate": "rad/s"}, "rudder", (0.8, 5), "geo", "us epoch ms", "BAT.Volt:12.6:0.2|BAT.Curr:8:2|GPS.HDop:0.8:0.1|GPS.NSats:14:1|MAG.MagX:180:25|IMU.AccX:0:0.3", "own", "one sparse channels runs"),
     "ROS export": Crew({"time": "time|%time|header.stamp", "lat": "field.latitude|/fix/latitude", "lon": "field.longitude|/fix/longitude", "x": "field.pose.pose.position.x|/odom/pose/position/x", "y": "field.pose.pose.position.y|/odom/pose/position/y", "psi": "yaw|/imu/yaw|field.yaw", "u": "field.twist.twist.linear.x|/odom/twist/linear/x", "v": "field.twist.twist.linear.y|/odom/twist/linear/y", "r": "field.twist.twist.angular.z|/imu/angular_velocity/z", "n": "/thrusters/{}/cmd|field.{}_thrust_cmd|{}_motor.data"}, {**BOT, "angle": "rad", "rate": "rad/s", "geo": "deg"}, "differential", (0.8, 5), "ros ros geo", "ns epoch nsecs", "field.header.seq:400:0|field.covariance0:0.1:0|/imu/linear_acceleration/x:0:0.2", "own", "one channels sparse runs", "left right", speeds="u,v|"),
     "research vessel, DP": Crew({"time": "Time|Date/Time", "lat": "DP Latitude|Pos_Lat", "lon": "DP Longitude|Pos_Lon", "north": "North pos|Northing", "east": "East pos|Easting", "psi": "Heading|Gyro avg|Hdg", "sog": "Speed over ground", "cog": "Course over ground", "u": "Surge speed|Vel fwd", "v": "Sway speed|Vel stbd", "r": "Rate of turn|Yaw rate", "n": "Main prop {} RPM|Thr {} RPM fb", "delta": "Rudder {} fb|Rudder {} angle", "alpha": "Thr {} azimuth fb|Azi {} angle", "tws": "True wind speed|Wind speed", "wind_from": "True wind direction|Wind dir", "set": "Heading setpoint|Hdg SP", "load": "Thr {} power"}, SURVEY, "azimuth twinrudders", (40, 120), "geo utm ned", "iso dots two excel", "Heave:0:0.3|Draught:5.2:0.01|Mode:2:0|Sea temp:9.8:0.05|Salinity:34.6:0.02", sides="PORT STBD", speeds="u,v|sog,cog|sog,cog", files="csv tsv xlsx"),
-    "fishing vessel": Crew({"lat": "latitude", "lon": "longitude", "psi": "heading", "sog": "sog", "cog": "cog", "r": "rot", "delta": "rudder", "n": "rpm"}, {**SEA, "geo": "deg"}, "rudder", (9, 35), files="nmea", layouts="one one", speeds="sog,cog", clocks="nmea"),
+    "fishing vessel": Crew({"lat": "latitude", "lon": "longitude", "psi": "heading", "sog": "sog", "cog": "cog", "r": "rot", "delta": "rudder", "n": "rpm"}, {**SEA, "geo": "deg"}, "rudder", (9, 35), files="nmea", layouts="one one", speeds="sog,cog", clocks="iso"),
     "barge, Dutch": Crew({"time": "Tijd|Tijdstip|Datum tijd", "lat": "Breedtegraad|Breedte", "lon": "Lengtegraad|Lengte", "north": "RD Y|Y", "east": "RD X|X", "psi": "Koers|Heading|Voorliggende koers", "sog": "Snelheid|Vaart over de grond", "cog": "Grondkoers|Koers over de grond", "r": "Bochtsnelheid|Bochtaanwijzer", "n": "Toerental {}|Schroef {} toeren", "delta": "Roerhoek|Roer|Roerstand", "load": "Verbruik {}"}, {**SEA, "speed": "km/h|km/h|kn"}, "rudder twin", (38, 135), "geo utm", "dots iso two", "Diepgang:2.8:0.01|Waterdiepte:4.5:0.6|Boegschroef uren:881:0", sides="BB SB", decimal=","),
     "training ship, French": Crew({"time": "Heure|Date heure|Horodatage", "lat": "Latitude|Lat", "lon": "Longitude|Long", "psi": "Cap|Cap vrai|Cap gyro", "sog": "Vitesse fond|Vitesse", "cog": "Route fond|Route", "r": "Taux de giration|Vitesse de lacet", "n": "Tours hélice {}|Régime {}", "delta": "Angle de barre|Barre", "aws": "Vitesse vent apparent", "awa": "Angle vent apparent", "set": "Cap ordonné", "load": "Puissance {}"}, SEA | {"rate": "deg/min|deg/s"}, "rudder twin", (25, 110), "geo", "slash iso two", "Sonde:41:3|Baromètre:1014:0.2|Officier:0:0", sides="BD TD", decimal=",", files="csv csv xlsx"),
     "patrol boat, Spanish": Crew({"time": "Hora|Fecha y hora|Tiempo", "lat": "Latitud|Lat", "lon": "Longitud|Lon", "psi": "Rumbo|Rumbo verdadero|Proa", "sog": "Velocidad|Velocidad fondo", "cog": "Rumbo fondo|Derrota", "r": "Velocidad de giro|Régimen de giro", "n": "RPM {}|Revoluciones eje {}", "delta": "Ángulo de timón|Timón", "phi": "Balance", "theta": "Cabeceo"}, SEA | {"rate": "deg/s|deg/min"}, "twin rudder", (12, 60), "geo", "slash iso time", "Profundidad:30:3|Combustible:64:0.1|Estado:1:0", sides="babor estribor"),
@@ -291,7 +291,7 @@ def columns_of(
     quality, n_max, signs = (
         pick([0.2, 1.0, 2.5]),
         float(record["n_max"].iloc[0]),
-        {one: pick([1, 1, -1]) for one in ("delta", "alpha")},
+        {one: pick([1, 1, 1 if crew.files == "nmea" else -1]) for one in ("delta", "alpha")},
     )
     compass = pick([0, 0, 0, 1, 0 if frame == "geo" else 2])  # 0..360, -180..180, unwrapped
     axes = FRAMES.get(frame, FRAMES["ned"])
@@ -386,7 +386,7 @@ def columns_of(
             late=late * (signal not in "uv"),
             **({"wrap": WRAPS[units["angle"], 0]} if signal == "cog" else {"sign": axes[4]} if signal == "v" else {}),
         )
-    if rng.random() < 0.75:
+    if rng.random() < 0.75 or crew.files == "nmea":
         add("r", sign=axes[4])
     for signal in (one for one in ("phi", "theta", "stw") if rng.random() < 0.5):
         add(signal)
@@ -452,7 +452,7 @@ def nmea_lines(rng: np.random.Generator, record: pd.DataFrame, start: datetime.d
     for k in range(len(record)):
         now = start + datetime.timedelta(seconds=float(record["t"].iloc[k]))
         spot = ",".join(
-            f"{int(abs(x)):0{w}d}{abs(x) % 1 * 60:08.5f},{'NS'[x < 0] if w == 2 else 'EW'[x < 0]}"
+            f"{int(abs(x)):0{w}d}{abs(x) % 1 * 60:08.5f},{'NS'[int(x < 0)] if w == 2 else 'EW'[int(x < 0)]}"
             for x, w in ((lat[k], 2), (lon[k], 3))
         )
         speed, course = (
