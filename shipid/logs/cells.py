@@ -96,11 +96,11 @@ def log_column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Seri
 
 
 def parse_numbers(
-    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = ""
+    log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = "", fillers: Sequence[float] = ()
 ) -> NDArray[np.float64]:
     """Turn a column into numbers, NaN where missing; text that is no number raises with its row.
 
-    sides : letters of an angle in degrees, such as 59°26'12.3"N.
+    sides : letters of an angle in degrees, such as 59°26'12.3"N. fillers : numbers that stand for no value.
     """
     column = log_column(log, source, file, path)
     numeric = pd.api.types.is_numeric_dtype(column.dtype)
@@ -128,6 +128,7 @@ def parse_numbers(
             )
     missing = text.isin(read.missing)
     numbers = text_numbers(text.mask(missing), read.decimal, read.thousands)
+    missing |= np.isin(numbers, fillers)
     if sides and np.any(~np.isfinite(numbers) & ~missing):
         words = in_points(text, read.decimal, None).mask(missing)
         angles = degrees_to_side(words, sides)

@@ -401,7 +401,10 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
         table, times, form, other = files[column.file or ""]
         sides = side_letters(name) if column.unit == "deg" and isinstance(column.source, str) else ""
         place = f"columns.{name}.from"
-        parts = [parse_numbers(table, one, form, other, place, sides) for one in source_columns(column.source)]
+        parts = [
+            parse_numbers(table, one, form, other, place, sides, column.missing)
+            for one in source_columns(column.source)
+        ]
         parts = [np.where(np.isin(one, column.missing), np.nan, one) for one in parts] if column.missing else parts
         names, coded = source_columns(column.source), column.unit in CODES and (column.unit != "deg" or len(parts) > 1)
         numbers = decode_numbers(parts, names, column.unit, table, other, place) if coded else parts[0]

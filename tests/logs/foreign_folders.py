@@ -12,9 +12,10 @@ import argparse
 import collections
 import dataclasses
 import datetime
+import functools
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -662,11 +663,13 @@ def draw_folder(seed: int, parent: Path) -> Folder:
     return Folder(seed, folder, {"length": length}, tuple(files), (*columns, *yaw), story)
 
 
-def judge_seed(seed: int) -> tuple[str, tuple[str, ...], Mapping[str, Any]]:
+def judge_seed(
+    seed: int, draw: Callable[[int, Path], Folder] = draw_folder
+) -> tuple[str, tuple[str, ...], Mapping[str, Any]]:
     """Draw and judge one folder: its word, the reasons, and its story."""
     parent = Path(tempfile.mkdtemp())
     try:
-        drawn = draw_folder(seed, parent)
+        drawn = draw(seed, parent)
         verdict = judge_raw(drawn)  # type: ignore[arg-type]
     finally:
         shutil.rmtree(parent)
@@ -678,7 +681,7 @@ def judge_seed(seed: int) -> tuple[str, tuple[str, ...], Mapping[str, Any]]:
 WORDS = ("right", "asked", "doubted", "missing", "not imported", "refused", "SILENT")  # best first
 
 
-def main() -> None:
+def main(draw: Callable[[int, Path], Folder] = draw_folder) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=20)
@@ -687,7 +690,7 @@ def main() -> None:
     asked = parser.parse_args()
     seeds = range(asked.seed, asked.seed + asked.count)
     with ProcessPoolExecutor(asked.jobs) as pool:
-        judged = list(pool.map(judge_seed, seeds))
+        judged = list(pool.map(functools.partial(judge_seed, draw=draw), seeds))
     counts = collections.Counter(word for word, _, _ in judged)
     print(f"{asked.count} folders:", ", ".join(f"{counts[word]} {word}" for word in WORDS))
     for seed, (word, reasons, story) in zip(seeds, judged, strict=True):

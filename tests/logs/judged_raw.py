@@ -53,7 +53,19 @@ def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[str, str]]:
         name: " ".join(question.sentence for question in guessed.questions if name in question.about)
         for name in {name for question in guessed.questions for name in question.about}
     }
-    drafted = {column.name: (column, _truth(units, column.source)) for column in guessed.columns}
+    parts = guessed.sniffed.in_parts  # a position that its letters alone say has the name of its column in front
+    drafted = {
+        column.name: (
+            column,
+            _truth(
+                units,
+                (parts.get(column.source) or (column.source,))[0]
+                if len(parts.get(column.source, "1")) == 1
+                else column.source,
+            ),
+        )
+        for column in guessed.columns
+    }
     psi, psi_true = drafted["psi"]
     mirror = _product(psi, psi_true) < 0
     wrong: list[tuple[str, str]] = []
@@ -63,7 +75,7 @@ def _columns(guessed: Guess, stranger: RawStranger) -> list[tuple[str, str]]:
         fault = _fault(name, column, true, mirror)
         if not fault:
             continue
-        said = " ".join(asked.get(one, "") for one in {name, name.rpartition(".")[2]})
+        said = " ".join(asked[one] for one in {name, name.rpartition(".")[2]} & asked.keys())
         if fault.startswith("from"):
             fits = [one for one in stranger.columns if not _fault(name, column, one, mirror).startswith("from")]
             right = {one.header for one in fits}

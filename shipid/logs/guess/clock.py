@@ -25,6 +25,7 @@ from shipid.logs.dates import (
     parse_dates,
 )
 from shipid.logs.formats import Format
+from shipid.logs.guess.evidence import usual_step
 from shipid.logs.guess.words import is_run, name_parts, units_in_name
 from shipid.logs.instants import check_times, clock_rounding, even_clock, read_time_column, rows_repeated
 from shipid.logs.mapping import AGAIN, EPOCHS, RESTS, Clock, clock_seconds, since_midnight, source_columns, to_si
@@ -43,7 +44,7 @@ CLOCK_WORDS = frozenset(
     (
         "t tvec time timestamp stamp clock sec secs seconds date datetime utc ms zeit messzeit zeitstempel "
         "tid tidspunkt sekunden millis epoch zulu hora temps heure elapsed stempel mess uhrzeit klokke tiempo "
-        "gmt datenum tow itow sow sod ticks filetime mjd jd julian"
+        "gmt datenum czas zaman aika aikaleima vrijeme tow itow sow sod ticks filetime mjd jd julian"
     ).split()
 )
 WRITTEN = {
@@ -233,7 +234,7 @@ def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str
             continue
         since = clock_seconds(since, _unit_of_clock(name, since)) if name in columns else since
         off = float(np.ptp(since - times))
-        if off > max(APART * float(np.median(np.diff(t))), OFF * float(times[-1] - times[0])):
+        if off > max(APART * usual_step(t), OFF * float(times[-1] - times[0])):
             how = f"{name!r} is a clock, too, and goes otherwise than that of the rows: they part by {off:.3g} s"
             yield f"{how}. Are the columns beside it of its times? Then write them to another file ([file.<name>])"
 
@@ -288,8 +289,8 @@ def _unit_of_clock(name: str, values: Array) -> str:
     since = [unit for unit in ("s", "ms", "us", "ns") if RECENT[0] < values[0] * to_si(unit, "t") < RECENT[1]]
     if since and (since != ["s"] or ends):  # however far apart; seconds without the name may be milliseconds of weeks
         return since[0]
-    if len(steps) and np.median(steps) >= 20 and not (since and np.any(values % 1)):
-        return next((unit for unit, least in FINE.items() if np.median(steps) >= least), "ms")
+    if len(steps) and usual_step(values) >= 20 and not (since and np.any(values % 1)):
+        return next((unit for unit, least in FINE.items() if usual_step(values) >= least), "ms")
     return "s"
 
 

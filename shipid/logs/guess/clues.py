@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.amounts import UNIT_WORDS, is_known, north_reference, without_prefix
-from shipid.logs.guess.evidence import Complex, RowWindows, order_effects
+from shipid.logs.guess.evidence import Complex, RowWindows, order_effects, window_length
 from shipid.logs.guess.words import (
     how_much_says,
     is_note,
@@ -34,7 +34,7 @@ FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db
 """Units of quantities that no column of a dataset has, in lower case."""
 
 
-PART = 0.4  # of the windows of the guess: about a quarter of a usual turn
+PART, SLOWEST = 0.4, 100.0  # of a radian of usual turning; s, in which the slowest ship turns by one
 LONGEST_UNIT = 6  # letters of a unit that is not known
 PART_OF_UNIT = re.compile(r"[\d.,/]+ ?[*×x]? ?([^\W\d]+|°)|([^\W\d]+|°) ?[*×x/] ?[\d.,]+")
 """A part or a multiple of a unit, as in 0.1 deg and deg x 10, in lower case."""
@@ -181,7 +181,7 @@ class State:
     @property
     def part(self) -> float:
         """Duration [s] of the windows in which effects of orders are seen, a part of a usual turn."""
-        return PART * float(np.median(self.t[self.chosen.last] - self.t[self.chosen.first]))
+        return PART * window_length(self.t, self.psi, self.chosen, SLOWEST)
 
     def command_of(self, name: str) -> str:
         """The command of the vessel whose component and signal the name of a column says; empty if none does."""

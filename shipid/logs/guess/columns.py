@@ -99,8 +99,7 @@ def guess(
     state.commands = () if vessel is None else vessel_dynamics(vessel).commands
     numbering = tuple(name for name, values in columns.items() if np.mean(np.diff(values) == 1.0) > NUMBERED)
     state.taken.update(numbering)
-    if source.parts:
-        _report_run_parts(state, source)
+    state.taken |= {*columns} & {source.parts.get("from")}
     take_scales(state)
     take_fills(state)
     if len(state.chosen.first) < 5:
@@ -129,19 +128,6 @@ def guess(
     defects_of_motion(state)
     left = unused_reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
-
-
-def _report_run_parts(state: State, source: GuessFiles) -> None:
-    column, pause = source.parts.get("from"), source.parts.get("pause")
-    said = [f"column {column!r} says them"] if column else []
-    said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []
-    state.taken.update({column} if column else ())
-    state.find(
-        "several runs in a file",
-        (column,) if column else (),
-        0.9,
-        f"{source.held} runs in {len(source.files)} file{'s' * (len(source.files) > 1)}: {' and '.join(said)}",
-    )
 
 
 def _choose_other_columns(state: State) -> None:

@@ -130,7 +130,7 @@ def _unknown_place(name: str, names: list[str]) -> str:
 
 def _take_angle(state: State, r: Array, name: str, signal: str, used: dict[str, int], sure: bool = True) -> None:
     """Suggest a column as an angle that steers, with the sign that the yaw rate shows; pulses as those of a servo."""
-    if _are_pulses(state.columns[name]):
+    if are_pulses(state.columns[name]):
         _take_servo(state, name, state.effect(r, state.columns[name]), used, signal)
         return
     turned = _centre_angle(state, name, signal)
@@ -421,7 +421,7 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
         steered = True
     drives = max((one for one in sure if one in state.free()), key=push.__getitem__, default="")
     alike = (drives, *(_alike(state, drives) if drives else ()))
-    seen = bool(drives) and (push[drives] > SETTINGS.seen or _are_pulses(state.columns[drives]))
+    seen = bool(drives) and (push[drives] > SETTINGS.seen or are_pulses(state.columns[drives]))
     if seen or (drives and _is_plain_actuator(drives)):
         zero, why = _neutral_value(state, drives)
         words = (
@@ -440,7 +440,7 @@ def _take_actuators(state: State, r: Array, steered: bool, used: dict[str, int])
 def _take_servo(state: State, name: str, effect: float, used: dict[str, int], signal: str = "delta") -> None:
     """Suggest pulses or a share as an angle: 45 deg at the largest value is a guess, and asked."""
     zero, why = _neutral_value(state, name)
-    full = 400.0 if _are_pulses(state.columns[name]) else float(np.abs(state.columns[name] - zero).max())
+    full = 400.0 if are_pulses(state.columns[name]) else float(np.abs(state.columns[name] - zero).max())
     factor = float(f"{45.0 / full:.6g}")
     state.turning[name] = float(np.sign(effect))
     sign = {"sign": -1} if (effect > 0) != (SIGNALS[signal].turns > 0) else {}
@@ -494,12 +494,12 @@ def _neutral_value(state: State, name: str) -> tuple[float, str]:
     still = values[state.chosen.first[speed < 0.05 * np.quantile(speed, 0.9)]]
     usual = float(np.median(still)) if len(still) >= 5 else 0.0
     if len(still) >= 5 and float(np.median(np.abs(still - usual))) < NOISE * float(np.ptp(values)):
-        other = _are_pulses(values) and abs(usual - SERVO) > OFF_SERVO  # the ship may stop for a moment as it turns
+        other = are_pulses(values) and abs(usual - SERVO) > OFF_SERVO  # the ship may stop for a moment as it turns
         return usual, "" if other else f"; {usual:g} while the ship is at rest"
-    return (SERVO, f"; {SERVO:g} is the middle of a servo") if _are_pulses(values) else (0.0, "")
+    return (SERVO, f"; {SERVO:g} is the middle of a servo") if are_pulses(values) else (0.0, "")
 
 
-def _are_pulses(values: Array) -> bool:
+def are_pulses(values: Array) -> bool:
     """Whether a column may be the pulses of a servo [us]."""
     running = values[values != 0.0]  # 0 is no pulse
     return bool(len(running) and PULSES[0] < running.min() and running.max() < PULSES[1] and np.ptp(running) > 20)
@@ -527,7 +527,7 @@ def _differ_in_motion(state: State, pair: tuple[str, str]) -> bool:
 def _says_actuator(state: State, name: str) -> bool:
     """Whether a name says an order, a throttle or per cent, or its numbers are pulses."""
     said = is_order(name) or bool(OF_ACTUATORS & {*name_parts(name)}) or unit_in_name(name, "rev/s") == "%"
-    return said or _are_pulses(state.columns[name])
+    return said or are_pulses(state.columns[name])
 
 
 def _is_plain_actuator(name: str) -> bool:

@@ -37,15 +37,15 @@ STEPS_ABOUT = 5  # steps before and after a row, at least, whose median is usual
 
 def defects_of_rows(state: State, sniffed: LogTable) -> None:
     """Report holes and missing values."""
-    steps = np.diff(sniffed.t)
-    holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
+    usual = evidence.usual_step(sniffed.t)
+    holes = int(np.sum(np.diff(sniffed.t) > evidence.GAP * usual))
     holes = max(holes - sniffed.seams, 0)
     if holes:
         state.find(
             "holes in time",
             source_columns(sniffed.clock["from"]),
             0.99,
-            f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s",
+            f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {usual:.3g} s",
         )
     missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
     if missing and not sniffed.scattered:  # no sentence says everything
@@ -67,8 +67,9 @@ def defects_of_motion(state: State) -> None:
         if found.cause == "sensor psi bias" and abs(found.size[0]) > TURNED_TRACK:
             _ask_about_north(state, -found.size[0], float(np.ptp(found.interval[0])) / 2)
         elif found.cause in CAUSES:
-            sure, seen = float(np.clip(found.share, 0.5, 0.95)), found.sentence.partition("; ")[0]
-            state.find(CAUSES[found.cause], (), sure, seen, repair)
+            known = np.ptp(found.interval[0]) < abs(found.size[0])  # else half of it may be none
+            sure = float(np.clip(found.share, 0.5, 0.95)) if known else 0.5
+            state.find(CAUSES[found.cause], (), sure, found.sentence.partition("; ")[0], repair)
         found = found.next
     _report_position_jumps(state)
 
@@ -107,7 +108,7 @@ def _diagnose_motion(state: State) -> Diagnosis | None:
     place, speed = state.position, state.body
     frame = pd.DataFrame({"t": state.t, "north": place.real, "east": place.imag, "psi": state.psi})
     frame = frame.assign(u=speed.real, v=speed.imag, r=rate, flags=0)
-    holes = np.diff(state.t, prepend=state.t[0]) > evidence.GAP * np.median(np.diff(state.t))
+    holes = np.diff(state.t, prepend=state.t[0]) > evidence.GAP * evidence.usual_step(state.t)
     frame.insert(0, "run", np.char.add("part ", np.cumsum(holes).astype(str)).astype(object))
     try:
         return diagnose(None, Dataset(frame, {"clock": "run", "flags": []}))

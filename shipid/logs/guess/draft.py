@@ -17,6 +17,7 @@ from shipid.logs import segments as cutting
 from shipid.logs.dates import format_date
 from shipid.logs.guess.clues import LIKELY, Clue, Suggestion
 from shipid.logs.guess.columns import Guess
+from shipid.logs.guess.evidence import usual_step
 from shipid.logs.guess.lapses import FILLS
 from shipid.logs.importing import file_digest, import_log
 from shipid.logs.mapping import (
@@ -146,9 +147,7 @@ def _draft_head(guess: Guess) -> Iterator[str]:
     yield from _block("format", sniffed.form)
     yield from _block("clock", sniffed.clock)
     first = guess.columns[0].source
-    usual = float(
-        np.median(np.diff(sniffed.t[np.isfinite(sniffed.columns[first])] if sniffed.scattered else sniffed.t))
-    )
+    usual = usual_step(sniffed.t[np.isfinite(sniffed.columns[first])] if sniffed.scattered else sniffed.t)
     longest = max(3.0, 5 * usual)
     sparse = [
         column.source

@@ -17,10 +17,10 @@ from shipid.data.dataset import Array, cumulative_integral
 
 Complex = NDArray[np.complex128]
 TURNS = (360.0, 2 * np.pi, 400.0, 3600.0, 36000.0, 6400.0)  # a whole turn in deg, rad, gon, 0.1 and 0.01 deg, mils
+CLOSE = 0.1  # of the longer steps: a shorter one leads to another row of the same moment
 GAP = 3.0  # usual steps: a longer one is a hole, and no window reaches over it
 WINDOW, STEPS, MOST = 10.0, 4, 1500  # s; steps and windows
 FALSE_STEP = np.radians(20.0)  # of a heading between two rows
-HOLE = 3.0  # times the usual step
 WILD, RARE = 5.0, 0.03  # times the larger rates, and share of the windows at most: then it is no turn of a ship
 LIVELY = 0.1  # of the larger changes over a window: in one of less nothing happens
 NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when they lead across 360
@@ -48,9 +48,15 @@ class Fit:
     left: float
 
 
+def usual_step(t: Array) -> float:
+    """The usual step of instants (N,); several that are close, as of the sensors of one moment, are one."""
+    steps = np.diff(t)
+    return float(np.median(steps[steps >= CLOSE * np.percentile(steps, 90)]))
+
+
 def row_windows(t: Array, duration: float = WINDOW) -> RowWindows:
     """Windows of about `duration` [s] without a hole: at least `STEPS` rows, at most a fifth of the log."""
-    usual = float(np.median(np.diff(t)))
+    usual = usual_step(t)
     duration = max(STEPS * usual, min(duration, (t[-1] - t[0]) / 5))
     first = np.arange(len(t))
     last = np.searchsorted(t, t + duration)
@@ -75,14 +81,10 @@ def fit_scale(seen: Complex, integrated: Complex) -> Fit:
     if power <= 0.0 or total <= 0.0:
         return Fit(0.0, np.inf, 1.0)
     scale = float(np.real(np.vdot(integrated, seen))) / power
-    parts = [
-        slice(a, b) for a, b in zip(*(np.linspace(0, len(seen), 21).astype(int)[i:] for i in (0, 1)), strict=False)
-    ]
-    powers = [float(np.sum(np.abs(integrated[part]) ** 2)) for part in parts]
     scales = [
-        float(np.real(np.vdot(integrated[part], seen[part]))) / size
-        for part, size in zip(parts, powers, strict=True)
-        if size > 0.01 * power / 20
+        float(np.real(np.vdot(ran, part))) / size
+        for ran, part in zip(np.array_split(integrated, 20), np.array_split(seen, 20), strict=True)
+        if (size := float(np.sum(np.abs(ran) ** 2))) > 0.01 * power / 20
     ]
     error = 1.25 * float(np.std(scales)) / np.sqrt(len(scales)) if len(scales) > 2 else np.inf
     return Fit(scale, error, float(np.sum(np.abs(seen - scale * integrated) ** 2)) / total)
@@ -106,7 +108,7 @@ def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.
     steps = np.abs(signed)
     ordinary = np.percentile(steps, 90) if len(steps) else 0.0
     large = steps > max(FALSE_STEP / (2 * np.pi), 5 * ordinary)
-    large &= np.diff(t) <= HOLE * np.median(np.diff(t)) if len(t) > 1 else True
+    large &= np.diff(t) <= GAP * usual_step(t) if len(t) > 1 else True
     between = large & (steps < 1.0 - max(FALSE_STEP / (2 * np.pi), 5 * ordinary))
     # the steps through false samples add up to about a whole turn; those of a spike to nothing
     near = np.abs(np.convolve(signed, np.ones(NEIGHBOURS), "same")) if len(signed) > NEIGHBOURS else steps
@@ -141,9 +143,10 @@ def _yaw_regression(t: Array, r: Array, orders: Array, duration: float) -> tuple
     chosen = row_windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = RowWindows(chosen.first[::thin], chosen.last[::thin])
-    width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
+    width = max(1, round(duration / 2 / usual_step(t)))
     signals = *(cumulative_integral(t, one) for one in (*orders, r)), t, r
-    smooth = [_moving_mean(x, width, _stretch_numbers(t)) for x in signals]
+    parts = _stretch_numbers(t)
+    smooth = [pd.Series(x).groupby(parts).rolling(width, center=True, min_periods=1).mean().to_numpy() for x in signals]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
     design = np.stack(columns, axis=1)
     wild = np.zeros(len(change), dtype=bool)
@@ -153,21 +156,14 @@ def _yaw_regression(t: Array, r: Array, orders: Array, duration: float) -> tuple
     return design[tame], change[tame]
 
 
-def _moving_mean(values: Array, width: int, stretch: NDArray[np.int_] | None = None) -> Array:
-    """The centred mean over `width` rows, of fewer at the ends of the log, or of each stretch (N,), (N,)."""
-    series = pd.Series(values)
-    rows = series if stretch is None else series.groupby(stretch)
-    return np.asarray(rows.rolling(width, center=True, min_periods=1).mean())
-
-
 def _stretch_numbers(t: Array) -> NDArray[np.int_]:
     """The number of the stretch without a hole that each row at t (N,) [s] is in."""
-    return np.append(0, np.cumsum(np.diff(t) > GAP * np.median(np.diff(t))))
+    return np.append(0, np.cumsum(np.diff(t) > GAP * usual_step(t)))
 
 
 def position_jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[int, int, float]]:
     """Where a position leaves its integrated velocity in one step: rows before and after, and lasting error [m]."""
-    usual = float(np.median(np.diff(t)))
+    usual = usual_step(t)
     reach = max(1, round(2.0 / usual))
     if len(t) < 20 * reach:
         return []
@@ -274,12 +270,12 @@ def _fill_column(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
     return np.where(known, values, (between - least) % turn + least)
 
 
-def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
-    """The length of windows [s] for this ship: about a radian of its usual turning, `WINDOW` at most.
+def window_length(t: Array, psi: Array, chosen: RowWindows, most: float = WINDOW) -> float:
+    """The length of windows [s] for this ship: about a radian of its usual turning, `most` at most.
 
     t (N,) [s], psi (N,) [rad].
     """
     span = t[chosen.last] - t[chosen.first]
     rates = np.abs(chosen.change(psi).real) / span
     turning = float(np.percentile(rates, 90)) if len(rates) else 0.0
-    return float(np.clip(1.0 / turning, 0.2, WINDOW)) if turning > 0 else WINDOW
+    return float(np.clip(1.0 / turning, 0.2, most)) if turning > 0 else most

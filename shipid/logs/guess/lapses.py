@@ -46,7 +46,7 @@ def take_fills(state: State) -> None:
     Rows before and after are far from it, as no ship stops or turns in one row. Short ones of a speed or a heading
     count as spikes.
     """
-    t, step = state.t, float(np.median(np.diff(state.t)))
+    t, step = state.t, evidence.usual_step(state.t)
     places = [name for meaning in ("latitude", "longitude") for name in state.called(meaning)[:1]]
     speeds, courses = [*state.called("speed"), *state.called("u")], state.called("course")
     for name in dict.fromkeys([*places, *speeds, *state.called("psi"), *courses]):
@@ -78,7 +78,7 @@ def take_fills(state: State) -> None:
 
 def report_stuck_sensors(state: State) -> None:
     """Report a heading, yaw rate, course or speed that repeats one value for long while the ship moves otherwise."""
-    t, follows = state.t, np.diff(state.t) <= evidence.GAP * np.median(np.diff(state.t))
+    t, follows = state.t, np.diff(state.t) <= evidence.GAP * evidence.usual_step(state.t)
     over_ground = np.zeros(len(t), dtype=np.complex128) if state.velocity is None else state.velocity
     rates = 0.0 * t if state.r is None else state.r, over_ground
     for one in (one for one in state.suggestions if one.name in ("psi", "r", "course", "speed")):
@@ -91,7 +91,7 @@ def report_stuck_sensors(state: State) -> None:
 
 def report_spikes(state: State) -> None:
     """Report spikes of what was measured, with the repair; an order that is given for a moment is none."""
-    step, rows = float(np.median(np.diff(state.t))), np.arange(len(state.t))
+    step, rows = evidence.usual_step(state.t), np.arange(len(state.t))
     spiky = {one.name: one for one in state.suggestions if one.source in state.spikes}
     places = [state.spikes[spiky[name].source][0] for name in POSITIONS if name in spiky]
     if places:
@@ -122,7 +122,7 @@ def _report(state: State, fault: tuple[str, str], name: str, t: Array, spans: Sp
 
 def break_repair(state: State, t: Array, spans: Spans) -> dict[str, Any] | None:
     """The repair that breaks a run in stretches of rows at t (N,) [s]; none where the rows are of several files."""
-    unit, step = to_si(state.clock_unit, "t"), float(np.median(np.diff(t)))
+    unit, step = to_si(state.clock_unit, "t"), evidence.usual_step(t)
     around = np.concatenate([[t[0] - step], t, [t[-1] + step]]) / unit
     intervals = [[float(around[a]), float(around[b + 1])] for a, b in spans]
     return None if state.joined else {"kind": "break", "intervals": intervals}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.logs.guess.clues import STRONG, State, unit_of_another
-from shipid.logs.guess.commands import unique_name
+from shipid.logs.guess.commands import are_pulses, unique_name
 from shipid.logs.guess.words import is_order, meaning_scores, name_parts, side_in_name, unit_in_name
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, rows_of_role, signal_of
 
@@ -19,7 +19,10 @@ def reserve_outputs(state: State) -> dict[str, str]:
             rivals = [score for meaning, score in scores.items() if meaning != signal]
             clear = unit not in (None, "%") or max(rivals, default=0.0) < scores[signal]
             clear = clear and scores[signal] >= STRONG and unit_of_another(name, signal) is None
-            clear = clear and not (signal == "thrust" and unit is None and "thruster" in name_parts(name))  # its order
+            clear = clear and not (
+                (signal == "thrust" and unit is None)
+                and ("thruster" in name_parts(name) or are_pulses(state.columns[name]))  # its order
+            )
             if clear and not is_order(name) and np.ptp(state.columns[name]) > 0:
                 chosen.setdefault(name, signal)
     state.taken.update(chosen)

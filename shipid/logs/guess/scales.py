@@ -37,6 +37,10 @@ def take_scales(state: State) -> None:
         if (factor := factor_in_name(name)) != 1.0:
             set_scale(state, name, factor, f"its unit has a prefix: times {factor:g}")
     pairs = [(a, b) for a in state.called("latitude") for b in state.called("longitude")]
+    if not pairs and not any(map(state.called, ("latitude", "longitude", "north", "east", "x", "y"))):
+        coded = [name for name in state.eligible("latitude", "longitude") if _are_minutes(np.abs(state.columns[name]))]
+        coded.sort(key=lambda name: float(np.abs(state.columns[name]).max()))
+        pairs = [(coded[0], coded[1])] if len(coded) == 2 else []
     if pairs:
         _take_positions(state, *pairs[0])
 
@@ -63,6 +67,14 @@ def _has_unit(name: str, words: str) -> bool:
     last = re.split(r"[_ ]", name.strip())[-1]
     said = [*units_in_name(name), *([last] if last != name.strip() else [])]
     return any(re.fullmatch(words, text.strip().lower()) for text in said)
+
+
+def _are_minutes(values: Array) -> bool:
+    """Whether sizes (N,) have the form of degrees and minutes, such as 6326.4012, and no other quantity has it."""
+    fine = np.mean(np.abs(100 * values - np.round(100 * values)) > 1e-6) > 0.5
+    return bool(
+        fine and values.min() > 100 and values.max() < 18000 and np.all(values % 100 < 60) and np.ptp(values) < 100
+    )
 
 
 def _take_positions(state: State, north: str, east: str) -> None:
@@ -112,9 +124,10 @@ def _off_speed(state: State, latitude: Array, longitude: Array) -> float:
     """What a speed says against positions (N,) [deg]: how far the way is off its integral, in any usual unit."""
     north, east, _ = geodetic2ned(latitude, longitude, 0.0, float(latitude[0]), float(longitude[0]), 0.0)
     way = float(np.sum(np.abs(state.chosen.change(np.asarray(north + 1j * east)))))
-    for name in [*state.called("speed"), *state.called("u")]:
-        values, written = state.columns[name], unit_in_name(name, "m/s")
-        ran = float(np.sum(np.abs(state.chosen.change(np.cumsum(np.abs(values) * np.gradient(state.t))))))
+    pairs = zip(state.called("velocity_north"), state.called("velocity_east"), strict=False)
+    for names in (*((name,) for name in (*state.called("speed"), *state.called("u"))), *pairs):
+        values, written = np.linalg.norm([state.columns[one] for one in names], axis=0), unit_in_name(names[0], "m/s")
+        ran = float(np.sum(np.abs(state.chosen.change(np.cumsum(values * np.gradient(state.t))))))
         parts = (1.0, *KNOTS) if written is None and np.mean(values % 1 == 0) > 0.1 else (1.0,)
         units = [UNITS["m/s"][unit] for unit in ((written,) if written else ("m/s", "kn", "km/h"))]
         if ran > 0:

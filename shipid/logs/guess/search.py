@@ -478,6 +478,7 @@ def _is_compass(name: str) -> bool:
 def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) -> Iterator[Velocity]:
     """Yield pairs of columns whose integral is the track: velocities of the Earth or of the ship, speed and course."""
     turn, used = np.exp(1j * theta), {pose.place.first, pose.place.second, pose.heading}
+    courses, headings = state.all_called("course"), state.all_called("psi")
     plain = {*state.eligible(*VELOCITIES)}  # no word of their names says another quantity
     steady = {
         kind: _left_by_constant(state, seen, way) for kind, way in (("earth", np.ones_like(turn)), ("body", turn))
@@ -487,21 +488,26 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
         sure, usual = one.named >= one.sure, _is_speed_unit(fit.scale)
         against = one.kind != "course" and not {one.first, one.second} <= plain
         limit = SETTINGS.left * steady[one.kind] if against else SETTINGS.named_left if sure else SETTINGS.left
+        if one.kind == "course" and not meaning_scores(one.second):
+            limit = min(limit, SETTINGS.named_left * steady["earth"])  # any still column is a straight course
         if fit.scale <= 0 or not (sure or usual) or fit.left > limit:
             continue
         cost = one.cost + float(np.log((fit.left + SETTINGS.floor) / (SETTINGS.unnamed + one.named))) + (not usual)
         cost += SETTINGS.odd * against
         unsure, drift = False, _drift_in_turns(state, one.ground, theta)
+        inward = -float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)  # a ship drifts out of its turns
         if one.kind == "body":  # against its mirror image, by the track, and by a ship's drift out of its turns
             mirror = _fit_of_path(state, seen, np.conj(one.ground / turn) * turn)
             by_track = float(np.log((fit.left + 1e-6) / (mirror.left + 1e-6)))
-            cost += max(by_track, 0.0) - float(np.log(1.0 - SETTINGS.outward)) * (drift > 0.0)
+            cost += max(by_track, 0.0) + inward
             cost += 0.1 * (one.side != pose.sense.sign)
             unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
             ahead = _path_of(state, state.columns[one.first] * turn)
             across = evidence.fit_scale(seen - fit.scale * ahead, _path_of(state, one.ground) - ahead).scale
             if not sure and abs(np.log(max(across, 1e-9) / fit.scale)) > 2 * SETTINGS.alike_left:
                 continue  # the second is no sway in the unit of the first: a roll, or nothing
+        elif one.kind == "course" and (one.second not in courses or pose.heading not in headings):
+            cost += inward
         elif one.kind == "course" and drift > 0.5:
             ahead = _fit_of_path(state, seen, state.columns[one.first] * turn)
             unsure = ahead.scale > 0 and ahead.left < 0.5 * fit.left

@@ -56,11 +56,13 @@ SENTINELS = tuple(
 )
 NOT_AVAILABLE = {
     "psi": {511.0: 360.0},
+    "n": {-1.0: 10.0},
     "speed": {102.3: 51.0, 1023.0: 600.0},
     "latitude": {91.0: 90.0, 99.0: 90.0, 54_600_000.0: 54e6},
     "longitude": {181.0: 180.0, 108_600_000.0: 108e6},
 }
-"""Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others."""
+"""Meaning -> number for none, as AIS writes it (ITU-R M.1371), decoded or not, or 99 N -> the largest of the others;
+below 0 the least: a shaft that never stops is not at -1 rpm."""
 VISITS, SELDOM = 3, 0.3  # rows at which a number for no value begins, at least; share of the rows, at most
 BEYOND, LEVELS, BEYOND_LEVELS = 4.0, 20, 50.0  # times the largest other; of one that has so few values, an order, more
 QUATERNIONS = ("xyzw", "XYZW", "1230", "2341")
@@ -146,18 +148,20 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
         if READERS[form["kind"]].scattered:  # a time alone, before the first fix, is no row
             table = table.loc[table.drop(columns="time").notna().any(axis=1)].reset_index(drop=True)
     other: dict[str, str] = table.attrs.get("other", {})
-    fillers: dict[str, list[float]] = {}
     _refuse_ships(table, file)
     decimal = form.get("decimal", ".")
     columns, words = _number_columns(table, decimal, form.get("thousands"))
-    rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
+    rarely = [
+        name for name, one in columns.items() if np.isfinite(one).mean() < 0.5 * _cells_of(table, name).ne("").mean()
+    ]
     in_text, letters = _in_text(table, [*words, *rarely], decimal)
     columns |= dict(in_text.values())
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
-    if isinstance(model, TableFormat):
-        missing, fillers = _words_for_nothing(table, columns, model), _take_fillers(columns)
-        if missing:
-            form["missing"] = [*model.missing, *missing]
+    fillers = _take_fillers(columns)
+    missing = []
+    if isinstance(model, TableFormat) and (missing := _words_for_nothing(table, columns, model)):
+        form["missing"] = [*model.missing, *missing]
+    if missing or fillers:
         said = [
             *map(repr, missing),
             *(f"{', '.join(map('{:.10g}'.format, fillers[one]))} of {one!r}" for one in fillers),
@@ -318,24 +322,40 @@ def _in_text(
 ) -> tuple[dict[str, tuple[str, Array]], frozenset[str]]:
     """Name -> column of text and degrees (N,) of each latitude, longitude and angle to a side of the ship in it.
 
-    Also the letters of the sides of the Earth. A column that holds a latitude and a longitude is called
-    `Position latitude` and `Position longitude`.
+    Also the letters of the sides of the Earth. Numbers for no value stay. A column that holds a latitude and
+    a longitude is called `Position latitude` and `Position longitude`; so is one whose letters alone say it.
     """
     found: dict[str, tuple[str, Array]] = {}
     letters: set[str] = set()
     for name in filter(None, names):
-        texts = in_points(column_called(table, name).astype(str).str.strip(), decimal, None)
+        texts = in_points(_cells_of(table, name), decimal, None)
+        least, plain = 0.5 * texts.ne("").mean(), text_numbers(texts, ".", None)
         sure = [one for one, score in meaning_scores(name).items() if score > 0.5]
         meant = [one for one in SIDES if one in sure] or [one for one in sure if one in ("delta", "alpha", "phi")]
         read = {one: degrees_to_side(texts, SIDES.get(one, OF_SHIP)) for one in meant or SIDES}
+        read = {
+            one: values
+            for one, values in read.items()
+            if np.mean(np.isfinite(values)) > least
+            and (meant or texts.str.contains(rf"[{SIDES[one]}]", case=False).mean() > least)
+        }
         # a time of day may be both: then they are equal
-        alike = not meant and np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) == 0
-        if alike or any(np.mean(np.isfinite(values)) <= 0.5 for values in read.values()):
+        alike = (
+            not meant and len(read) > 1 and np.nanmax(np.abs(read["latitude"] - read["longitude"]), initial=0.0) == 0
+        )
+        if alike or len(read) < len(meant):
             continue
-        found |= {name if meant else f"{name} {one}": (name, values) for one, values in read.items()}
+        for one, values in read.items():
+            found[name if meant else f"{name} {one}"] = name, np.where(np.isin(plain, SENTINELS), plain, values)
         held = [letter for one in read for letter in SIDES.get(one, "")]
         letters |= {letter for letter in held if texts.str.contains(letter, case=False).any()}
     return found, frozenset(letters)
+
+
+def _cells_of(table: pd.DataFrame, name: str) -> pd.Series[Any]:
+    """The cells (N,) of the first column of this name as text, empty where there is none."""
+    column = column_called(table, name)
+    return column.astype(str).str.strip().where(column.notna(), "")
 
 
 def _side_columns(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
@@ -381,7 +401,7 @@ def _take_fillers(columns: dict[str, Array]) -> dict[str, list[float]]:
                 continue
             low, high = float(others.min()), float(others.max())
             if value in never:
-                known = max(-low, high) > never[value]
+                known = max(-low, high) > never[value] if value > 0.0 else low < never[value]
             elif value not in SENTINELS:  # of no recorder that is known
                 known = not _is_filler(values, value)
             else:

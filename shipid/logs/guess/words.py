@@ -15,28 +15,29 @@ from shipid.logs.mapping import UNITS
 from shipid.physics.signals import SIGNALS
 
 CONCEPTS = {
-    "latitude": "lati plat breite breitengrad bredde breddegrad breddgrad latitud latitudine breedtegraad breedte",
+    "latitude": "lati plat breite breitengrad bredde breddegrad breddgrad latitud latitudine breedtegraad breedte "
+    "enlem leveysaste leveys szerokosc sirina zemepisna sirka laiuskraad lintang",
     "longitude": "lon longi plon lng laenge laengengrad laengdgrad lengde lengdegrad lengtegraad lengte longitud "
-    "longitudine",
+    "longitudine boylam pituusaste pituus dlugosc duzina dolzina delka pikkuskraad bujur",
     "north": "northing nord nordwert hochwert norte noord",
     "east": "easting ost oest oestlig este leste oost rechtswert",
     "pos": "position posicion posisjon posizione posicao positie lage stand stellung stilling ausschlag utslag",
     "angle": "ang angulo angolo winkel vinkel hoek",
     "direction": "dir direccion direzione direcao richtung richting retning riktning",
-    "heading": "hdg hdt hehdt head cap koers rumbo rumo rwk",
-    "prow": "proa prua prora stevn staev aproamento",
-    "course": "kurs",
-    "track": "route rotta derrota bahn",
-    "gyro": "kreisel",
+    "heading": "hdg hdt hehdt head cap koers rumbo rumo rwk keulasuunta suunta keula pramac haluan",
+    "prow": "proa prua prora stevn staev aproamento pruva",
+    "course": "kurs kurz kurss kurssi",
+    "track": "route rotta derrota bahn rota kulkusuunta",
+    "gyro": "kreisel zyro",
     "compass": "kompass kompas compas bussola aguja",
     "magnetic": "mag magnet magnetisch magnetique magnetico magnetisk",
     "steered": "steuer styrt styret styrd",
-    "ground": "grund grunn bunden fond fondo fundo sol grond",
-    "over": "ueber ue sobre",
+    "ground": "grund grunn bunden fond fondo fundo sol grond dnem dnie pohjan yere dnom",
+    "over": "ueber ue sobre suhteen nad gore",
     "through": "durch durchs gjennom door genom gennem",
     "water": "wasser vann vannet vand vatten eau agua acqua",
     "speed": "vel velocity velocities spd geschwindigkeit geschw hastighet hastighed fart fahrt vaart vitesse "
-    "velocidad velocidade velocita snelheid",
+    "velocidad velocidade velocita snelheid predkosc nopeus hiz hizi brzina hitrost rychlost viteza kecepatan",
     "logg": "loch corredera solcometro",
     "surge": "jag cavalement",
     "sway": "svai embardee",
@@ -47,33 +48,37 @@ CONCEPTS = {
     "trasversale transverse transv laterale athwart",
     "lat": "lateral",
     "drift": "deriva scarroccio derive",
-    "turn": "dreh sving svinge wende draai dreie drei dreje giration giro accostata virata rotasjons bocht",
+    "turn": "dreh sving svinge wende draai dreie drei dreje giration giro accostata virata rotasjons bocht zwrotu "
+    "katowa donus donme kaantymis okretanja zataceni",
     "yaw": "gier gir giring girings lacet guinada imbardata",
-    "rate": "taux razon regimen rateo taxa",
+    "rate": "taux razon regimen rateo taxa orani",
     "roll": "heel kraengung kraengungs rull rullning krengning krengnings krenge krangning krangnings gite roulis "
     "escora balance sbandamento rollio slagzij helling rol slingering schlagseite",
     "trim": "trimm tangage assiette cabeceo beccheggio assetto nick stampf",
-    "wind": "vind vent viento vento",
+    "wind": "vind vent viento vento wiatr wiatru ruzgar tuuli tuulen vjetar",
     "true": "vrai vraie vero vera verdadero sann wahr wahrer ware",
     "relative": "rel relatif relativo relativa relativer relativ app apparent apparente aparente scheinbar "
     "scheinbarer schijnbare",
-    "rudder": "rud rudders ruder ror roer roder timon timone leme barre barra gouvernail safran pala",
-    "azimuth": "azi azimut azimutale azimute asimut azipod schottel srp asd gondel ruderpropeller",
+    "rudder": "rud rudders ruder ror roer roder timon timone leme barre barra gouvernail safran pala dumen ster "
+    "steru perasin kormilo kormila krmilo kormidlo carma kemudi",
+    "azimuth": "azi azimut azimutale azimute asimut azipod schottel srp asd gondel ruderpropeller azipull aquamaster",
     "thruster": "thr thrusters strahler propulsor propulseur",
-    "propeller": "prop propell propel helice elica schroef schrauben schraube",
-    "shaft": "arbre eje asse aksel axel welle wellen",
-    "motor": "moteur motore",
+    "propeller": "prop propell propel helice elica schroef schrauben schraube sruba sruby pervane potkuri vijak vijka",
+    "shaft": "arbre eje asse aksel axel welle wellen saft walu akseli osovina",
+    "motor": "moteur motore silnik silnika makine kone stroja",
     "rpm": "rps revs rev revolutions revoluciones umdrehungen omdreininger omdreinings omdrejninger omdrejnings "
-    "tours astoerental giri vueltas toeren tur varv turns regime rotacoes",
+    "tours astoerental giri vueltas toeren tur varv turns regime rotacoes obroty obrotow devir devri kierrosluku "
+    "okretaji otacky turatie putaran",
     "number": "zahl tall tal",
     "cpp": "steigung stigning spoed paso passo",
     "force": "kraft kracht styrke staerke",
     "thrust": "schub skyve skyvekraft poussee empuje spinta stuw",
     "torque": "drehmoment dreiemoment akselmoment couple coppia koppel",
     "moment": "momento",
-    "power": "puissance potencia potenza vermogen leistung effekt",
+    "power": "puissance potencia potenza vermogen leistung effekt moc mocy guc teho snaga vykon",
     "fuel": "verbrauch kraftstoff consommation carburant consumo combustible carburante brandstof drivstoff forbruk",
-    "depth": "profondeur profundidad profundidade sonda profondita diepte dybde djup tiefe echolot ekkolodd sounder",
+    "depth": "profondeur profundidad profundidade sonda profondita diepte dybde djup tiefe echolot ekkolodd sounder "
+    "glebokosc derinlik syvyys dubina",
     "draft": "draught tirant calado pescaggio immersione tiefgang tauchung",
     "temp": "temperature temperatura temperatuur temperatur",
     "battery": "batterie bateria batteria",
@@ -84,7 +89,7 @@ CONCEPTS = {
     "bow": "etrave baug",
     "deg": "degrees",
 }
-"""Concept -> words for it in ten languages."""
+"""Concept -> words for it in ten languages, and fewer in Polish, Finnish, Turkish, Croatian, Czech and others."""
 _CONCEPT_OF_WORD = {word: concept for concept, words in CONCEPTS.items() for word in words.split()}
 PHRASES: dict[str, str] = {
     "latitude": "lat, latitude, phi gps",
@@ -194,9 +199,11 @@ UNIT_PARTS = frozenset(
 )
 """Parts that are a unit at the end of a name."""
 _SIDES = {
-    "port": "port ps bb bab br babord backbord p prt portside left babor bakboord bagbord sinistra sx links gauche "
+    "port": "iskele lewa lewy lewej vasen lijevo lijevi "
+    "port ps bb bab br babord backbord p prt portside left babor bakboord bagbord sinistra sx links gauche "
     "bd bombordo",
-    "starboard": "starboard stbd sb tri er stb styrbord steuerbord s strbd right star tribord trib td tb estribor "
+    "starboard": "sancak prawa prawy prawej oikea desno desni "
+    "starboard stbd sb tri er stb styrbord steuerbord s strbd right star tribord trib td tb estribor "
     "dritta dx stuurboord rechts droite be estibordo",
     "stern": "stern",
     "bow": "bow",
@@ -223,7 +230,19 @@ RUN_NUMBERS = frozenset(
 )
 _LETTERS = {"ψ": "psi", "δ": "delta", "φ": "phi", "ϕ": "phi", "θ": "theta", "χ": "chi", "α": "alpha", "ω": "omega"}
 _LETTERS |= {"β": "beta", "ä": "ae", "ö": "oe", "ü": "ue", "ø": "oe", "å": "aa", "æ": "ae", "ß": "ss", "Ψ": "psi"}
-_LETTERS |= {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "Ø": "Oe", "Å": "Aa", "λ": "lambda", "°": " deg "}
+_LETTERS |= {
+    "Ä": "Ae",
+    "Ö": "Oe",
+    "Ü": "Ue",
+    "Ø": "Oe",
+    "Å": "Aa",
+    "λ": "lambda",
+    "°": " deg ",
+    "ı": "i",
+    "ł": "l",
+    "đ": "d",
+    "œ": "oe",
+}
 TRANSLATED = {
     "latitude": "緯度 纬度 위도 широта",
     "longitude": "経度 經度 经度 경도 долгота",
@@ -288,7 +307,7 @@ WHOLE = dict.fromkeys(
     ("bow", "thruster"),
 )
 WHOLE |= dict.fromkeys(("heckstrahler", "heckstrahlruder", "hekschroef", "hekkpropell"), ("stern", "thruster"))
-WHOLE |= {"propellerpm": ("propeller", "rpm")}
+WHOLE |= {"propellerpm": ("propeller", "rpm"), "kulmanopeus": ("turn", "speed")}
 """Words that are cut into parts of another language."""
 _OF_SHAFT = re.compile(rf"k?({UNIT_WORDS['rpm']})|rps|rev/s")
 """Units of a shaft speed, in lower case, that no other quantity has."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from shipid.logs.guess.columns import guess
+from tests.logs.crews import draw_folder
 from tests.logs.drawn_logs import CLOCKS, Drawn, draw, judge
 from tests.logs.judged_raw import judge_raw
 from tests.strangers_raw import raw_stranger
@@ -71,3 +72,10 @@ def test_degrees_of_a_log_without_names_are_no_metres(tmp_path: Path) -> None:
 def test_revolutions_a_second_that_are_called_rpm_are_read_by_the_way_of_the_ship(seed: int, tmp_path: Path) -> None:
     """They were 60 times too slow without a word."""
     assert judge(draw(seed, tmp_path / "logs")).word == "right"
+
+
+@pytest.mark.parametrize("seed", [50459871, 50459918, 50459920])
+def test_folders_of_crews_are_read(seed: int, tmp_path: Path) -> None:
+    """Positions by their letters alone; 9999 for none among them; the rudder of a ship that takes minutes to turn."""
+    verdict = judge_raw(draw_folder(seed, tmp_path))  # type: ignore[arg-type]
+    assert verdict.word == "right", verdict.reasons

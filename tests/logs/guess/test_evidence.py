@@ -66,3 +66,10 @@ def test_a_heading_that_crosses_north_for_a_row_has_no_spike(seed: int) -> None:
     slow = np.round((middle + 100 + 20 * np.sin(t / 40)) % 360, 1)
     slow[100] = (slow[100] + 120) % 360
     assert np.flatnonzero(evidence.spike_rows(slow)).tolist() == [100]
+
+
+def test_rows_of_one_moment_are_no_usual_step() -> None:
+    """Sensors of one moment, a millisecond apart, made every step between moments a hole."""
+    t = np.sort(np.concatenate([np.arange(100.0) + offset for offset in (0.0, 0.001, 0.002)]))
+    assert evidence.usual_step(t) == pytest.approx(0.998)
+    assert evidence.usual_step(np.arange(100.0)) == 1.0

@@ -74,7 +74,6 @@ def test_files_of_several_runs_are_parted(column: bool, tmp_path: Path) -> None:
     found = guess(folder)
     assert found.source.held == 6
     assert found.source.parts.get("from") == ("Test no" if column else None)
-    assert "several runs in a file" in found.kinds
     dataset = import_log(read_mapping(write_new(draft_mapping(found), tmp_path / "draft.toml")), folder)
     assert dataset.runs == [
         f"{day} {number + 7 * column}" for day in ("one", "two") for number in range(1 - column, 4 - column)
