@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.logs.amounts import UNIT_WORDS, is_known, north_reference, without_prefix
-from shipid.logs.guess.evidence import Complex, RowWindows, order_effects, window_length
+from shipid.logs.guess.evidence import WINDOW, Complex, RowWindows, order_effects, window_length
+from shipid.logs.guess.settings import SETTINGS
 from shipid.logs.guess.words import (
     how_much_says,
     is_note,
@@ -181,7 +182,8 @@ class State:
     @property
     def part(self) -> float:
         """Duration [s] of the windows in which effects of orders are seen, a part of a usual turn."""
-        return PART * window_length(self.t, self.psi, self.chosen, SLOWEST)
+        longest = SLOWEST if np.ptp(self.psi) > SETTINGS.turned else WINDOW  # noise of a straight course is no turning
+        return PART * window_length(self.t, self.psi, self.chosen, longest)
 
     def command_of(self, name: str) -> str:
         """The command of the vessel whose component and signal the name of a column says; empty if none does."""
