@@ -502,8 +502,8 @@ def _velocity_hypotheses(state: State, pose: Pose, seen: Complex, theta: Array) 
             cost += max(by_track, 0.0) + inward
             cost += 0.1 * (one.side != pose.sense.sign)
             unsure = abs(by_track) < SETTINGS.alike_left or (by_track < 0.0) == (drift > 0.0)
-            ahead = _path_of(state, state.columns[one.first] * turn)
-            across = evidence.fit_scale(seen - fit.scale * ahead, _path_of(state, one.ground) - ahead).scale
+            surge = _path_of(state, state.columns[one.first] * turn)
+            across = evidence.fit_scale(seen - fit.scale * surge, _path_of(state, one.ground) - surge).scale
             if not sure and abs(np.log(max(across, 1e-9) / fit.scale)) > 2 * SETTINGS.alike_left:
                 continue  # the second is no sway in the unit of the first: a roll, or nothing
         elif one.kind == "course" and (one.second not in courses or pose.heading not in headings):
