@@ -263,6 +263,8 @@ def is_clock(name: str) -> bool:
 
 def _unit_of_clock(name: str, values: Array) -> str:
     """The unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
+    if not len(values):
+        return "s"  # what reads it says that it is empty
     if are_in_one_number(values):
         return "date"
     again = _wrapping_clock_unit(values)

@@ -252,11 +252,12 @@ def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str,
     assert words in caught.value.message
 
 
-def test_a_clock_of_numbers_that_lacks_one_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", [3, 0])
+def test_a_clock_of_numbers_that_lacks_some_or_all_is_named(first: int, tmp_path: Path) -> None:
     frame = pd.DataFrame({"time": np.arange(90.0), "north": np.arange(90.0) ** 2})
-    frame.loc[3, "time"] = np.nan
+    frame.loc[first : 90 * (first == 0) + first, "time"] = np.nan
     frame.to_parquet(tmp_path / "log.parquet")
-    with pytest.raises(DataError, match="'time' in row 4: no time here: remove the row"):
+    with pytest.raises(DataError, match=f"'time' in row {first + 1}: no time here: remove the row"):
         recognise_log(tmp_path / "log.parquet")
 
 

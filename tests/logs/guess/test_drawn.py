@@ -74,6 +74,12 @@ def test_revolutions_a_second_that_are_called_rpm_are_read_by_the_way_of_the_shi
     assert judge(draw(seed, tmp_path / "logs")).word == "right"
 
 
+@pytest.mark.parametrize(("seed", "word"), [(73047, "reported"), (73322, "right")])
+def test_columns_without_names_are_not_taken_for_heading_and_sway(seed: int, word: str, tmp_path: Path) -> None:
+    """The course alone was taken for the heading, a roll for the sway, without a word."""
+    assert judge(draw(seed, tmp_path / "logs")).word == word
+
+
 @pytest.mark.parametrize("seed", [50459871, 50459918, 50459920])
 def test_folders_of_crews_are_read(seed: int, tmp_path: Path) -> None:
     """Positions by their letters alone; 9999 for none among them; the rudder of a ship that takes minutes to turn."""
