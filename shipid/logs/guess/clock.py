@@ -158,7 +158,7 @@ def _choose_clock(
         except DataError as error:
             name, place = keys["from"], f" in {error.path}" * ("row" in str(error.path))
             sure = "date" in keys or not isinstance(name, str) or _nearly_rises(_as_numbers(table, columns, name))
-            sure = sure or (name in columns and np.isnan(columns[name]).all())  # nor is a counter the clock then
+            sure = sure or bool(name in columns and np.isnan(columns[name]).all())  # nor is a counter the clock then
             faults.append((sure, f"{name!r}{place}: {error.message}"))
     fault = max(faults, key=lambda one: one[0], default=(False, "none rises from row to row"))[1]
     raise DataError(f"no column can be the clock: {fault}", file=file)
